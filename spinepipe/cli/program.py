@@ -25,6 +25,7 @@ COMMANDS = {
     "export": "write a specimen's model as an OpenSim file",
     "index": "write the page of all studies, results/index.html, and say which are up to date",
     "compare": "set two studies side by side: what changed",
+    "plan": "say before an experiment which effects its tests could name",
     "why": "say why an effect is named by a study, or why not",
     "archive": "pack a computed study as a zip, for the supplement of a paper",
     "docs": "write the generated parts of the documentation",

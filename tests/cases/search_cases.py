@@ -94,6 +94,6 @@ def searched(
     """The search of a study; ``backwards``: effects are tried in the other order."""
     names = sorted(one.specimen for one in given)
     tried = trials(effects, ROTATIONS, names, JOINTS)
-    rules = Rules(tried[::-1] if backwards else tried, ROTATIONS, MARGIN, 3, 0)
+    rules = Rules(tried[::-1] if backwards else tried, ROTATIONS, 3)
     found = search(grounds_of(given), rules, at_once)
     return Searched(found, outcome(found))

@@ -6,8 +6,9 @@ from scipy.spatial.transform import Rotation
 from spinepipe.effects import PlaceSpread, Wrench, create
 from spinepipe.frames import Pose
 from spinepipe.model import Body, LoadCase, LoadStep, ScopedEffect, SpineModel
-from spinepipe.studies.discrepancy.design.extra_tests import bench, not_testable
-from spinepipe.studies.discrepancy.design.fisher_information import specimen_signatures
+from spinepipe.studies.discrepancy.design.distinguishability import not_testable
+from spinepipe.studies.discrepancy.design.information import Bench
+from spinepipe.studies.discrepancy.design.signatures import cohort_signatures
 from spinepipe.studies.discrepancy.design.testable import Judgement, judgements
 from spinepipe.studies.discrepancy.search.baseline import (
     DAMPING,
@@ -88,9 +89,7 @@ def grounds_of(
 
 def judged(grounds: BaselineFit, effects) -> dict[str, Judgement]:
     tried = tried_in(grounds, effects) if isinstance(effects[0], str) else effects
-    joints = next(iter(grounds.fit.models.values())).n_joints
-    of = {name: specimen_signatures(grounds, name, tried) for name in grounds.readings}
-    found = judgements(tried, of, joints, grounds.tests, NEEDED, 0)
+    found = judgements(cohort_signatures(grounds, tried), NEEDED)
     return {one.effect: one for one in found}
 
 
@@ -103,7 +102,7 @@ def revealed(grounds: BaselineFit, effect: str) -> str:
     """The test that would tell."""
     tried = tried_in(grounds, [effect])
     found = list(judged(grounds, tried).values())
-    (one,) = not_testable(bench(grounds, None), tried, found, NEEDED, 0)
+    (one,) = not_testable(Bench.of(grounds, None), tried, found, NEEDED)
     return one.test_that_would_tell
 
 

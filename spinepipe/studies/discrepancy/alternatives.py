@@ -14,12 +14,10 @@ from spinepipe.studies.discrepancy.misfits import (
     change_of_misfit,
     place_of_most,
 )
-from spinepipe.studies.discrepancy.quantities import UNITS
 from spinepipe.studies.discrepancy.verdict import NOTHING, SOMETHING_ELSE, SURE, Verdict
 from spinepipe.studies.discrepancy.verdict import VerdictKind as Ended
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.discrepancy.words import (
-    SET_UP,
     general,
     in_words,
     name_at,
@@ -30,8 +28,7 @@ from spinepipe.studies.discrepancy.words import (
 UNNAMED = "what no effect explains"
 """How the subject of advice begins that is on what has no name."""
 
-WITHHELD = "withheld"
-"""How a message begins that tells what an error of the set-up would have to be known to."""
+NO_NAMES = (SOMETHING_ELSE, NOTHING)
 
 _MOST_WORDS_OF_CURVE = 7
 
@@ -110,14 +107,6 @@ def unnamed(verdict: Verdict, where: pd.DataFrame, gap: pd.DataFrame) -> Iterato
         yield Conclusion(
             "curve", "left_out" if "closed" in values else "fit", values, {"curve": curve}
         )
-    for one in {one.name: one for one in reversed(verdict.withheld)}.values():
-        unit, factor = ("%", 100.0) if one.unit == "1" else UNITS.get(one.unit, (one.unit, 1.0))
-        values = {"allowed": Value(factor * one.allowed, unit, source="verdict: withheld")}
-        if one.known_to is not None:
-            values["known"] = Value(factor * one.known_to, unit, source="verdict: withheld")
-        imperfection = SET_UP.get(one.imperfection, plain(one.imperfection))
-        names = {"effect": general(one.name), "imperfection": imperfection}
-        yield Conclusion("hidden", "known" if "known" in values else "unknown", values, names)
 
 
 def next_test(verdict: Verdict, next_tests: pd.DataFrame) -> Iterator[Conclusion]:
@@ -144,18 +133,15 @@ def advised(verdict: Verdict, next_tests: pd.DataFrame) -> dict[str, Any] | None
     if next_tests.empty:
         return None
     runs = next_tests[next_tests["status"] == USEFUL[0]]
-    runs = runs[(runs["cycles"] > 0) & ~runs["message"].str.startswith(WITHHELD)]
-    order = ["unnamed", "separate", "show"]
+    order = ["unnamed", "separate"]
     if verdict.verdict is Ended.SET:
-        order = ["separate", "unnamed", "show"]
+        order = ["separate", "unnamed"]
     rows = [{str(name): cell for name, cell in row.items()} for row in runs.to_dict("records")]
     return min(rows, key=lambda row: order.index(_asks(row["effect_or_pair"])), default=None)
 
 
 def _asks(subject: str) -> str:
-    if subject.startswith(UNNAMED):
-        return "unnamed"
-    return "separate" if " or " in subject else "show"
+    return "unnamed" if subject.startswith(UNNAMED) else "separate"
 
 
 def run_in_words(run: str) -> str:

@@ -22,9 +22,10 @@ from spinepipe.studies.discrepancy.curve_numbers import (
     reaches,
     tabulated_rows,
 )
-from spinepipe.studies.discrepancy.design.advice import advice, hidden_effects
+from spinepipe.studies.discrepancy.design.advice import advice
 from spinepipe.studies.discrepancy.design.distinguishability import distinguishability
-from spinepipe.studies.discrepancy.design.extra_tests import bench
+from spinepipe.studies.discrepancy.design.information import Bench
+from spinepipe.studies.discrepancy.design.testable import LEAD
 from spinepipe.studies.discrepancy.mistakes.data_errors import before_a_fit
 from spinepipe.studies.discrepancy.rows import (
     advice_csv,
@@ -197,10 +198,7 @@ def _start_model(ready: Prepared, of: str) -> ModelFile:
 def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> DiscrepancyResults:
     """The results of an investigation, and what the tests could tell apart."""
     joints, rules = ready.cohort.joint_names, ended.rules
-    needed = rules.needed + rules.margin
-    told = distinguishability(
-        ended.grounds, rules.trials, needed, ready.study.margin, ready.declared, rules.seed, run
-    )
+    told = distinguishability(ended.grounds, rules.trials, rules.needed + LEAD, ready.declared, run)
     ended = ended.for_verdict()
     found, outcome = ended.found, ended.ended
     base, final = found.base.fit, found.final.fit
@@ -212,7 +210,6 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     )
     stays = _beyond(ended, run)
     table = None if stays.table is None else stays.grounds.fit
-    hidden = hidden_effects(found, outcome, rules, run)
     gap = gap_rows(found, joints, table)
 
     # what a tester reads off the curves that effects which stand, named or tied, change
@@ -220,7 +217,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
     forms = [one.supposed.form for one in found.standing if one.name in names]
     numbers = field_number_rows(base, final, forms, reaches(gap)) if forms else []
     return DiscrepancyResults(
-        verdict=summarise(ready, ended, told, stays, taken["with_effects"], hidden, run),
+        verdict=summarise(ready, ended, told, stays, taken["with_effects"], run),
         rows={
             "gap": gap,
             "candidates": candidate_rows(found, rules.needed, joints),
@@ -233,7 +230,7 @@ def _with_base(ready: Prepared, ended: Investigation, run: PieceRunner) -> Discr
                 row for model, one in taken.items() for row in imperfection_rows(one, model)
             ],
             "next_tests": advice_rows(
-                advice(found, outcome, rules, bench(ended.grounds, ready.declared), run, hidden)
+                advice(found, outcome, Bench.of(ended.grounds, ready.declared), run)
             ),
         },
         model_base=_model(ready, ended.grounds.fit, "base"),

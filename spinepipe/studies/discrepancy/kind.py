@@ -78,4 +78,5 @@ KIND = Kind(
     holds=True,
     exports="export:exported",
     explains="why:why",
+    plans="plan:plan",
 )

@@ -99,7 +99,9 @@ class Discrepancy(Study):
 
     kind: Literal["discrepancy"] = Field(description="kind of study")
     base: DiscrepancyBase = Field(description="the model that is asked what it lacks")
-    seed: int = Field(default=2024, ge=0, le=2**32 - 1, description="seed of every random draw")
+    seed: int = Field(
+        default=2024, ge=0, le=2**32 - 1, description="read by versions before; does nothing now"
+    )
     tests: Tests | None = Field(default=None, description="tests used; null: all with motion")
     coordinates: Coordinates | None = Field(
         default=None, description="measured coordinates used; null: all that were measured"
@@ -111,10 +113,7 @@ class Discrepancy(Study):
         default=3, ge=1, le=10, description="most effects that are named; three at most"
     )
     margin: float = Field(
-        default=3.0,
-        ge=0,
-        le=1e3,
-        description="log evidence from which a further test has told two names apart",
+        default=3.0, ge=0, le=1e3, description="read by versions before; does nothing now"
     )
     effort: Literal["quick", "standard", "full"] = Field(
         default="quick",

@@ -1,18 +1,16 @@
 """The verdict, from what a search found: names, sets, what stays, and where."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.design.distinguishability import Distinguishability
-from spinepipe.studies.discrepancy.design.masked_effects import MaskedEffects
 from spinepipe.studies.discrepancy.proof.held_out import HeldOut
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.imperfections import AbsorbedGap
 from spinepipe.studies.discrepancy.search.investigation import Investigation, Prepared
-from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.noise import Noise as FittedNoise
 from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.regions import values_with_regions
@@ -36,7 +34,6 @@ from spinepipe.studies.discrepancy.verdict import (
     Threshold,
     Verdict,
     VerdictScope,
-    WithheldEffect,
     share_of_gap,
 )
 from spinepipe.studies.discrepancy.verdict_unnamed import UnnamedMisfit, UnnamedRest
@@ -51,7 +48,6 @@ def summarise(
     told: Distinguishability,
     stays: ResidualModel,
     taken: AbsorbedGap,
-    hidden: Sequence[MaskedEffects],
     run: PieceRunner,
 ) -> Verdict:
     """What a search found, in a few words.
@@ -59,7 +55,7 @@ def summarise(
     Parameters
     ----------
     told : what these tests can tell. stays : what describes what has no name.
-    taken : what imperfections take up beside the final model. hidden : effects that they hide.
+    taken : what imperfections take up beside the final model.
     """
     cohort = ready.cohort
     found, proof, ended = investigation.found, investigation.proof, investigation.ended
@@ -80,14 +76,6 @@ def summarise(
     evident = found.probabilities[SOMETHING_ELSE] >= EVEN
     shape = found.lack.shape if evident else None
     coordinate = found.lack.coordinate if shape else None
-
-    withheld = []
-    for one in hidden:
-        allowed, unit = display_value(one.unit, one.prior)
-        known_to = None if one.needed is None else one.needed * allowed
-        withheld.append(
-            WithheldEffect(one.effect, one.kind, allowed, known_to, unit, one.now, one.at[0.0])
-        )
     return Verdict(
         cohort=cohort.name,
         verdict=ended.verdict,
@@ -116,7 +104,6 @@ def summarise(
             None if taken.without is None else taken.without.gap, taken.beside.gap
         ),
         tabulated=stays.table,
-        withheld=tuple(withheld),
         left_out=tuple(_left_out(proof)),
         probabilities={n: p for n, p in found.probabilities.items() if p >= LEAST_PROBABLE},
         search=found.extent,

@@ -341,28 +341,6 @@ class Imperfections:
 
 
 @dataclass(frozen=True)
-class WithheldEffect:
-    """An effect that is not named, as an imperfection that is allowed for explains it as well.
-
-    Attributes
-    ----------
-    imperfection : kind of the imperfection. allowed : its prior SD, in ``unit``; unit 1 is a share.
-    known_to : largest prior SD, in ``unit``, at which the effect would pass the threshold; None
-        where knowing this kind alone is not enough, or only at an SD nobody can reach.
-    log_evidence : of the effect, with the prior SD ``allowed``. log_evidence_if_known : with that
-        SD 0.
-    """
-
-    name: str
-    imperfection: str
-    allowed: float
-    known_to: float | None
-    unit: str
-    log_evidence: float
-    log_evidence_if_known: float
-
-
-@dataclass(frozen=True)
 class Verdict:
     """All that a search says in a few words; see docs/studies/discrepancy.md.
 
@@ -372,11 +350,11 @@ class Verdict:
     effects : missing for certain.
     candidates_in_set : names that these data cannot tell apart.
     candidates : the same, each with the coordinates it would load.
+    withheld : of files written by versions before; empty now.
     unknown : why nothing is named, and what is missing; None where there is no such reason.
     part : of PART, what stays beside ``effects``.
     imperfections : what those allowed for took up; None where the base has no fit.
     tabulated : of UNKNOWN and PART, tables in the model file for what has no name; None for none.
-    withheld : effects that imperfections hide, one entry for each kind of imperfection that does.
     left_out : held-out gaps by what was left out, tests and specimens apart.
     probabilities : that each effect is missing, `SOMETHING_ELSE` is, and `NOTHING`; those below
         `LEAST_PROBABLE` are not told. Empty in files written before the key existed.
@@ -400,7 +378,7 @@ class Verdict:
     threshold: Threshold = field(default_factory=Threshold)
     imperfections: Imperfections | None = None
     tabulated: Tabulated | None = None
-    withheld: tuple[WithheldEffect, ...] = ()
+    withheld: tuple[Mapping[str, Any], ...] = ()
     left_out: tuple[LeftOut, ...] = ()
     probabilities: Mapping[str, float] = field(default_factory=dict)
     search: SearchExtent | None = None

@@ -65,8 +65,6 @@ def _lines(
             )
     for one in (o for o in verdict.smallest_detectable if o.name == effect):
         yield f"It is found in nine data sets of ten from a misfit of {one.gap:.2f} noise SD on."
-    for hidden in (one for one in verdict.withheld if one.name == effect):
-        yield f"Errors of {hidden.imperfection} that are allowed for may hide it."
     about = (row for row in next_tests if effect in row["effect_or_pair"].split(" or "))
     runs = [row for row in about if row["status"] in USEFUL and row["cycles"] > 0]
     for best in sorted(runs, key=lambda row: -row["gain_per_cycle"])[:1]:

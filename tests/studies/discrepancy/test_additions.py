@@ -1,20 +1,16 @@
 """Additions to a plan of tests: loads, times and readings, by hand."""
 
-from dataclasses import replace
-
 import numpy as np
 from sweeps import sweep
 from testable_cases import case_of, spine_of
 
 from spinepipe.cohort.specimen import cables
 from spinepipe.model import LoadCase
-from spinepipe.studies.discrepancy.design.extra_tests import MENU
 from spinepipe.studies.discrepancy.design.plans import (
     PRELOAD_N,
-    Plan,
     PlannedTest,
-    plan_of_readings,
-    thin_steps,
+    planned_of,
+    repeats_of,
     unloads,
     with_preloads,
 )
@@ -22,38 +18,38 @@ from spinepipe.studies.discrepancy.design.runs import runs
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
 
 
-def plan_of(*cases: LoadCase, zeroed: bool = True) -> Plan:
+def plan_of(*cases: LoadCase, zeroed: bool = True) -> list[PlannedTest]:
     count = np.tile([0, 0, 0, 3, 3, 3], (2, 1))
-    return Plan(tuple(PlannedTest(case, count) for case in cases), zeroed, "per_joint")
+    return [PlannedTest(case, count, zeroed) for case in cases]
 
 
-def added(words: str, plan: Plan) -> Plan | None:
-    (addition,) = [one for one in MENU if words in one.words]
-    return addition.to(plan)
+def added(words: str, plan: list[PlannedTest]) -> PlannedTest:
+    (run,) = [one for one in runs(plan) if words in one.words]
+    return run
 
 
 def levels(case: LoadCase) -> list[float]:
     return [-float(step.wrenches[0].moment[2]) for step in case.steps]
 
 
-def test_additions_change_loads_and_times_as_they_say():
+def test_runs_change_loads_and_times_as_they_say():
     case = case_of("flexion", 2, (0.0, 2.0, 4.0), 5.0)
     plan = plan_of(case)
-    back = added("unloading", plan).tests[0].case
+    back = added("unloading", plan).case
     assert levels(back) == [0.0, 2.0, 4.0, 2.0, 0.0]
     assert [step.time for step in back.steps] == [0.0, 5.0, 10.0, 15.0, 20.0]
     assert unloads(back)
     assert not unloads(case)
-    assert levels(added("opposite", plan).tests[1].case) == [0.0, -2.0, -4.0]
-    assert levels(added("1.5 times", plan).tests[0].case) == [0.0, 3.0, 6.0]
-    assert [s.time for s in added("10 times", plan).tests[0].case.steps] == [0.0, 50.0, 100.0]
-    held = added("held", plan).tests[0].case
+    assert levels(added("new test: extension", plan).case) == [0.0, -2.0, -4.0]
+    assert levels(added("1.5 times", plan).case) == [0.0, 3.0, 6.0]
+    assert [s.time for s in added("10 times", plan).case.steps] == [0.0, 50.0, 100.0]
+    held = added("held", plan).case
     assert levels(held)[3:] == [4.0] * (len(held.steps) - 3)
     assert held.steps[-1].time == 610.0
-    read = added("translations", plan).repeats()[0].count
-    assert (read[1:] == 3).all()
+    read = repeats_of(added("translations", plan)).count
+    assert (read[1:] == 1).all()
     assert (read[0] == 0).all()
-    assert (added("not zeroed", plan).repeats()[0].count[0, :, 3:] == 3).all()
+    assert (repeats_of(added("not zeroed", plan)).count[0, :, 3:] == 1).all()
 
 
 def tensions(plan_or_tests, test: str) -> list[float]:
@@ -64,37 +60,25 @@ def tensions(plan_or_tests, test: str) -> list[float]:
     return [float(one.values[0, 0]) for one in found[1:] if one.in_scope(test)]
 
 
-@sweep(
-    "words, name, beside",
-    [("opposite", "opposite", []), ("follower load", "preloaded", [PRELOAD_N])],
-)
-def test_added_tests_keep_the_follower_load_of_their_rig(words, name, beside):
-    cases = [case_of(test, 2, (0.0, 2.0, 4.0)) for test in ("flexion", "turning")]
-    tests = added(words, plan_of(*cases)).tests
-    assert tensions(tests, "flexion") == [100.0]
-    assert tensions(tests, f"flexion, {name}") == [100.0, *beside]
-    assert tensions(tests, "turning") == []
-    assert tensions(tests, f"turning, {name}") == beside
+def test_a_run_under_more_load_is_beside_the_follower_load_of_its_rig():
+    run = added("follower load", plan_of(case_of("flexion", 2, (0.0, 2.0, 4.0))))
+    assert tensions([run], "flexion") == [100.0, PRELOAD_N]
+    assert tensions([run], "turning") == []
 
 
 def test_a_spine_set_up_anew_or_bent_the_other_way_is_under_its_follower_load():
-    menu = runs(plan_of(case_of("flexion", 2, (0.0, 2.0, 4.0))).tests, zeroed=True)
-    others = [one.test for one in menu if one.test.case.test != "flexion"]
+    menu = runs(plan_of(case_of("flexion", 2, (0.0, 2.0, 4.0))))
+    others = [one for one in menu if one.case.test != "flexion"]
     assert {"flexion, set up anew", "added extension"} <= {one.case.test for one in others}
     for one in others:
         assert tensions([one], one.case.test) == [100.0]
 
 
-def test_what_a_plan_has_is_not_added():
-    both_ways = case_of("flexion", 2, (0.0, 2.0, 4.0, 2.0, 0.0, -2.0, -4.0), 5.0)
-    plan = replace(plan_of(both_ways, zeroed=False), grouping="per_specimen")
-    for words in ("unloading", "opposite", "not zeroed", "times recorded, 10", "base that shares"):
-        assert added(words, plan) is None
-
-
-def test_a_thinned_plan_keeps_first_farthest_and_last_step():
+def test_a_thinned_test_keeps_first_farthest_and_last_step():
     moments = [*np.linspace(0.0, 7.0, 18), *np.linspace(6.5, 1.0, 23)]
-    kept = levels(thin_steps(plan_of(case_of("flexion", 2, moments)), 10).tests[0].case)
+    case = case_of("flexion", 2, moments)
+    readings = SpecimenReadings("a", (), (Repeats(case, np.zeros((1, len(moments), 2, 6))),))
+    kept = levels(planned_of(readings, True, 10)[0].case)
     assert len(kept) <= 11
     assert [kept[0], max(kept), kept[-1]] == [0.0, 7.0, 1.0]
 
@@ -104,7 +88,7 @@ def test_cycles_whose_loads_differ_a_little_are_one_test():
     read = np.zeros((1, 3, 2, 6))
     read[..., :3] = np.nan
     readings = SpecimenReadings("a", (), tuple(Repeats(case, read) for case in cases))
-    (one,) = plan_of_readings(readings, True, "per_joint").tests
+    (one,) = planned_of(readings, True, 10)
     assert one.case == cases[0]
     assert one.count.tolist() == [[0, 0, 0, 3, 3, 3]] * 2
 

@@ -173,8 +173,6 @@ KNOWN = {"name": "half_width", "value": 1.55, "unit": "deg", "ci95": [1.42, 1.69
 OPEN = KNOWN | {"ci95": [1.42, None], "open_above": True, "identifiable": False}
 TABLE = {"place": "right bending over extension at L4L5", "gap": 0.3}
 PART, UNKNOWN = VERDICTS["PART"]["part"], VERDICTS["UNKNOWN"]["unknown"]
-HIDDEN = {"name": "load_offset", "imperfection": "load_gain", "allowed": 0.02, "unit": "1"}
-HIDDEN |= {"log_evidence": 1.0, "log_evidence_if_known": 9.0}
 TIED = [{"name": name, "coordinates": ["extension"]} for name in ("neutral_zone", "creep")]
 TIED = [one | {"behind": 2.0 * n} for n, one in enumerate(TIED)]
 
@@ -304,10 +302,7 @@ CASES: tuple[Case, ...] = (
         "unknown": UNKNOWN | {"formula": {"terms": []}},  # of a file of versions before
         "tabulated": TABLE | {"held_out_closed": None}}),
     Case("PART", "next unnamed", advised(NEXT[0], "flexion: once more")),
-    Case("NULL", "next show", advised(NEXT[1], "flexion: once more")),
     Case("NULL", "next none", advised(NEXT[1], "flexion: once more", "tells_nothing")),
-    Case("NULL", "hidden known", None, {"withheld": [HIDDEN | {"known_to": 0.005}]}),
-    Case("NULL", "hidden unknown", None, {"withheld": [HIDDEN | {"known_to": None}]}),
     # can it be trusted?
     Case("NAMED", "noise check_assumed", None, {"noise": ASSUMED}),
     Case("NAMED", "outliers check", None, {"noise": NOISE | {"outliers_left_out": 4}}),

@@ -15,25 +15,17 @@ from next_test_cases import (
     shared_form,
     tried,
 )
-from search_cases import MARGIN
 from spring_chain_cases import THERE_AND_BACK, cases
 from sweeps import sweep
 
-from spinepipe.studies.discrepancy.design.advice import (
-    ADVISED,
-    TELLS_NOTHING,
-    advice,
-    hidden_effects,
-)
-from spinepipe.studies.discrepancy.design.extra_tests import bench
-from spinepipe.studies.discrepancy.design.next_test import (
+from spinepipe.studies.discrepancy.design.advice import ADVISED, TELLS_NOTHING, advice
+from spinepipe.studies.discrepancy.design.information import (
+    Bench,
     ExpectedReadings,
-    Sums,
+    Information,
     noncentrality,
-    offers,
-    remaining_chi2,
 )
-from spinepipe.studies.discrepancy.design.patterns import RivalFits
+from spinepipe.studies.discrepancy.design.next_test import RivalFits, offers, remaining_chi2
 from spinepipe.studies.discrepancy.design.plans import PlannedTest, at_times
 from spinepipe.studies.discrepancy.design.runs import runs
 from spinepipe.studies.discrepancy.rows import advice_csv, advice_rows
@@ -86,7 +78,7 @@ def test_an_advised_run_tells_about_what_was_promised(rival, words, case):
     for seed in range(3):
         grounds, true, other = pair(seed, rival)
         pattern = RivalFits(grounds, other.fit, true.fit)
-        now, then = (remaining_chi2(pattern, bench(grounds, None), one) for one in (None, words))
+        now, then = (remaining_chi2(pattern, Bench.of(grounds, None), one) for one in (None, words))
         promised.append(0.5 * (then - now))
         before = true.log_evidence - other.log_evidence
         told.append(margin_after(seed, rival, case, seed) - before)
@@ -96,7 +88,7 @@ def test_an_advised_run_tells_about_what_was_promised(rival, words, case):
 
 def test_the_best_run_is_the_one_in_which_the_models_part():
     grounds, true, other = pair(0, "facet_contact")
-    found = offers([RivalFits(grounds, other.fit, true.fit)], bench(grounds, None))
+    found = offers([RivalFits(grounds, other.fit, true.fit)], Bench.of(grounds, None))
     gains = {one.words: one.gain for one in found}
     assert found[0].words == TURNED_ROUND
     assert gains[TURNED_ROUND] > 10.0 * gains["flexion: once more"] > 0.0
@@ -110,31 +102,38 @@ def test_what_stays_between_two_models_is_a_least_squares_problem():
     rng = np.random.default_rng(0)
     keys = [("kind", "c", joint, "*") for joint in range(5)]
     old = ExpectedReadings(
-        rng.normal(size=30), rng.normal(size=(30, 3)), rng.normal(size=(30, 4)), tuple(keys[:4])
+        rng.normal(size=(30, 1)),
+        rng.normal(size=(30, 3)),
+        rng.normal(size=(30, 4)),
+        tuple(keys[:4]),
     )
     new = ExpectedReadings(
-        rng.normal(size=12), rng.normal(size=(12, 3)), rng.normal(size=(12, 3)), tuple(keys[2:])
+        rng.normal(size=(12, 1)),
+        rng.normal(size=(12, 3)),
+        rng.normal(size=(12, 3)),
+        tuple(keys[2:]),
     )
     sds = np.array([0.5, 3.0, 2.0])
-    found = noncentrality({"a": Sums.of(old).plus(Sums.of(new))}, sds)
+    of_old, numbers = Information.of(old), {"a": np.arange(3)}
+    found = noncentrality({"a": of_old.plus(Information.of(new))}, numbers, sds)
     rows = np.zeros((30 + 12 + 5 + 3, 3 + 5))
     rows[:30, :3], rows[:30, 3:7] = old.by_unknowns, old.moves
     rows[30:42, :3], rows[30:42, 5:] = new.by_unknowns, new.moves
     rows[42:47, 3:], rows[47:, :3] = np.eye(5), np.diag(1.0 / sds)
-    target = np.concatenate([old.difference, new.difference, np.zeros(8)])
+    target = np.concatenate([old.by_effects[:, 0], new.by_effects[:, 0], np.zeros(8)])
     best = np.linalg.solve(rows.T @ rows, rows.T @ target)
     assert found == pytest.approx(np.sum((target - rows @ best) ** 2), rel=1e-9)
-    assert found > noncentrality({"a": Sums.of(old)}, sds)
+    assert found > noncentrality({"a": of_old}, numbers, sds)
 
 
-def planned(case, *, translations: bool = False) -> PlannedTest:
+def planned(case, *, translations: bool = False, zeroed: bool = False) -> PlannedTest:
     count = np.ones((JOINTS, 6), dtype=np.int64)
     count[:, :3] = translations
-    return PlannedTest(case, count)
+    return PlannedTest(case, count, zeroed)
 
 
-def offered(tests, zeroed: bool = False) -> set[str]:
-    return {one.words for one in runs(tests, zeroed)}
+def offered(tests) -> set[str]:
+    return {one.words for one in runs(tests)}
 
 
 def test_nothing_is_offered_that_is_there():
@@ -152,7 +151,8 @@ def test_nothing_is_offered_that_is_there():
     assert any("translations read" in words for words in there)
     assert not any("translations read" in words for words in offered(read))
     assert not any("not zeroed" in words for words in there)
-    assert any("not zeroed" in words for words in offered(one_way, zeroed=True))
+    zeroed = [planned(case, zeroed=True) for case in cases(UP, JOINTS)]
+    assert any("not zeroed" in words for words in offered(zeroed))
 
 
 def test_a_test_done_at_both_rates_needs_no_slower_one():
@@ -168,12 +168,11 @@ def test_a_test_done_at_both_rates_needs_no_slower_one():
 def test_a_set_gets_a_test_that_tells_its_names_apart():
     grounds = grounds_of(readings(0))
     effects = ["facet_contact", TRUE]
-    rules = Rules(trials(effects, ROTATIONS, tuple(STIFFNESS), JOINTS), ROTATIONS, MARGIN, 3, 0)
+    rules = Rules(trials(effects, ROTATIONS, tuple(STIFFNESS), JOINTS), ROTATIONS, 3)
     found = search(grounds, rules, at_once)
     ended = outcome(found)
     assert ended.verdict is VerdictKind.SET
-    hidden = hidden_effects(found, ended, rules, at_once)
-    told = advice(found, ended, rules, bench(grounds, None), at_once, hidden)
+    told = advice(found, ended, Bench.of(grounds, None), at_once)
     (best,) = [one for one in told if one.status == ADVISED]
     assert set(best.subject.split(" or ")) == set(effects)
     assert best.test == TURNED_ROUND

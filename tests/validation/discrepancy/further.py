@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from spinepipe.studies.discrepancy.design.fisher_information import specimen_signatures
-from spinepipe.studies.discrepancy.design.testable import judgements
+from spinepipe.studies.discrepancy.design.signatures import cohort_signatures
+from spinepipe.studies.discrepancy.design.testable import LEAD, judgements
 from spinepipe.studies.discrepancy.proof.held_out import STEPS, TEST, FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
@@ -81,10 +81,7 @@ def testable_told(found: SearchResult, rules: Rules, names: Sequence[str]) -> To
     if not mine:
         return {}
     grounds = found.base
-    of = {name: specimen_signatures(grounds, name, mine) for name in grounds.readings}
-    joints = next(iter(grounds.fit.models.values())).n_joints
-    needed = rules.needed + rules.margin
-    judged = judgements(mine, of, joints, grounds.tests, needed, rules.seed)
+    judged = judgements(cohort_signatures(grounds, mine), rules.needed + LEAD)
     repeats = repeats_of(grounds)
     return {
         one.effect: {

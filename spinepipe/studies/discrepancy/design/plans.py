@@ -130,16 +130,28 @@ class PlannedTest:
 
     ``preload``: of a follower load through the joints' centres, N, beside that of the rig.
     ``rig``: the test whose rig it is done in, if it is not called so itself.
+    ``words``: what it is, where it is offered.
     """
 
     case: LoadCase
     count: Indices
+    zeroed: bool
     preload: float = 0.0
     rig: str = ""
+    words: str = ""
 
     def renamed(self, case: LoadCase) -> "PlannedTest":
         """A test of another name in the same rig."""
         return replace(self, case=case, rig=self.rig or self.case.test)
+
+
+def repeats_of(one: PlannedTest) -> Repeats:
+    """Readings of zero wherever the test reads."""
+    cycle = np.arange(one.count.max())[:, None, None, None]
+    shape = (len(cycle), len(one.case.steps), *one.count.shape)
+    readings = np.where(np.broadcast_to(cycle < one.count, shape), 0.0, np.nan)
+    by_step = without_step_0(readings.swapaxes(0, 1), one.zeroed)
+    return Repeats(one.case, by_step.swapaxes(0, 1))
 
 
 def with_preloads(model: SpineModel, tests: Sequence[PlannedTest]) -> SpineModel:
@@ -159,48 +171,22 @@ def with_preloads(model: SpineModel, tests: Sequence[PlannedTest]) -> SpineModel
     return model.with_effects((*effects, *cables(tension_n, model.n_joints)))
 
 
-@dataclass(frozen=True)
-class Plan:
-    """The tests of a specimen, and the base that is fitted to them: ``grouping``."""
+def planned_of(one: SpecimenReadings, zeroed: bool, most_steps: int) -> list[PlannedTest]:
+    """The tests that a specimen has had; cycles whose loads differ a little are one test.
 
-    tests: tuple[PlannedTest, ...]
-    zeroed: bool
-    grouping: str
-
-    def repeats(self) -> tuple[Repeats, ...]:
-        """Readings of zero wherever the plan reads."""
-        found = []
-        for one in self.tests:
-            cycle = np.arange(one.count.max())[:, None, None, None]
-            shape = (len(cycle), len(one.case.steps), *one.count.shape)
-            readings = np.where(np.broadcast_to(cycle < one.count, shape), 0.0, np.nan)
-            by_step = without_step_0(readings.swapaxes(0, 1), self.zeroed)
-            found.append(Repeats(one.case, by_step.swapaxes(0, 1)))
-        return tuple(found)
-
-
-def plan_of_readings(one: SpecimenReadings, zeroed: bool, grouping: str) -> Plan:
-    """The tests that a specimen has had; cycles whose loads differ a little are one test."""
+    Of long tests about ``most_steps`` load steps: the first, the farthest and the last stay.
+    """
     planned: dict[str, PlannedTest] = {}
     for test in one.tests:
         name, count = test.case.test, test.count.max(axis=0)
         known = planned.get(name)
-        if known is None:
-            planned[name] = PlannedTest(test.case, count)
-        else:
+        if known is not None:
             planned[name] = replace(known, count=known.count + count)
-    return Plan(tuple(planned.values()), zeroed, grouping)
-
-
-def thin_steps(plan: Plan, steps: int) -> Plan:
-    """A plan with about that many load steps per test at most: first, farthest and last stay."""
-    tests = []
-    for one in plan.tests:
-        count = len(one.case.steps)
-        if count > steps:
-            even = np.linspace(0, count - 1, steps).round().astype(int)
-            chosen = sorted({*even.tolist(), farthest(one.case)})
-            case = replace(one.case, steps=tuple(one.case.steps[k] for k in chosen))
-            one = replace(one, case=case)
-        tests.append(one)
-    return replace(plan, tests=tuple(tests))
+            continue
+        case = test.case
+        if len(case.steps) > most_steps:
+            even = np.linspace(0, len(case.steps) - 1, most_steps).round().astype(int)
+            chosen = sorted({*even.tolist(), farthest(case)})
+            case = replace(case, steps=tuple(case.steps[k] for k in chosen))
+        planned[name] = PlannedTest(case, count, zeroed)
+    return list(planned.values())

@@ -5,7 +5,7 @@ shares the errors of that set-up; another direction and a new set-up have a name
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -50,45 +50,31 @@ DIRECTIONS = {
 AGAIN = ("once more", "set up anew, once more")
 
 
-@dataclass(frozen=True)
-class ExtraCycle:
-    """One more cycle of a test.
-
-    Attributes
-    ----------
-    words : what it is. test : loads and what is read. zeroed : whether readings are zeroed.
-    """
-
-    words: str
-    test: PlannedTest
-    zeroed: bool
-
-
-def runs(tests: Sequence[PlannedTest], zeroed: bool) -> list[ExtraCycle]:
+def runs(tests: Sequence[PlannedTest]) -> list[PlannedTest]:
     """The menu for a specimen that has had these tests; nothing that is there already but repeats.
 
     A run is offered once, however many ways lead to it.
     """
-    found: dict[tuple[object, ...], ExtraCycle] = {}
-    for one in (*_variations(tests, zeroed), *_directions(tests, zeroed)):
-        if one.words.endswith(AGAIN) or not any(_has(test, zeroed, one) for test in tests):
-            case, read = one.test.case, one.test.count.astype(bool).tobytes()
+    found: dict[tuple[object, ...], PlannedTest] = {}
+    for one in (*_variations(tests), *_directions(tests)):
+        if one.words.endswith(AGAIN) or not any(_has(test, one) for test in tests):
+            case, read = one.case, one.count.astype(bool).tobytes()
             loads = tuple(np.round(load, 9).tobytes() for load in summed_loads(case))
             seconds = tuple(step.time for step in case.steps)
-            way = (case.test, loads, seconds, read, one.test.preload, one.zeroed)
+            way = (case.test, loads, seconds, read, one.preload, one.zeroed)
             found.setdefault(way, one)
     return list(found.values())
 
 
-def _has(test: PlannedTest, zeroed: bool, one: ExtraCycle) -> bool:
+def _has(test: PlannedTest, one: PlannedTest) -> bool:
     """Whether a test that was done is the added run already, about as slow where it has times."""
-    loads, added = summed_loads(test.case), summed_loads(one.test.case)
+    loads, added = summed_loads(test.case), summed_loads(one.case)
     same = len(loads) == len(added) and np.allclose(loads, added)
-    timed = not has_times(one.test.case) or (
-        has_times(test.case) and _lasts(test.case) >= 0.5 * _lasts(one.test.case)
+    timed = not has_times(one.case) or (
+        has_times(test.case) and _lasts(test.case) >= 0.5 * _lasts(one.case)
     )
-    read = bool((test.count >= one.test.count).all())
-    return same and timed and read and (test.preload, zeroed) == (one.test.preload, one.zeroed)
+    read = bool((test.count >= one.count).all())
+    return same and timed and read and (test.preload, test.zeroed) == (one.preload, one.zeroed)
 
 
 def _lasts(case: LoadCase) -> float:
@@ -96,23 +82,22 @@ def _lasts(case: LoadCase) -> float:
     return every[-1] - every[0]
 
 
-def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCycle]:
+def _variations(tests: Sequence[PlannedTest]) -> Iterator[PlannedTest]:
     for one in tests:
         case, name = one.case, one.case.test
         once = replace(one, count=np.minimum(one.count, 1))
 
-        def run(words: str, changed: LoadCase, once: PlannedTest = once) -> ExtraCycle:
-            return ExtraCycle(words, replace(once, case=changed), zeroed)
+        def run(words: str, changed: LoadCase, once: PlannedTest = once) -> PlannedTest:
+            return replace(once, case=changed, words=words)
 
         yield run(f"{name}: once more", case)
         anew = once.renamed(replace(case, test=f"{name}, set up anew"))
-        yield ExtraCycle(f"{name}: specimen taken out, set up anew, once more", anew, zeroed)
+        yield replace(anew, words=f"{name}: specimen taken out, set up anew, once more")
         for part, what in ((slice(0, 3), "translations"), (slice(3, 6), "rotations")):
             if not one.count[:, part].any():
                 count = once.count.copy()
                 count[:, part] = 1
-                words = f"{name}: {what} read as well"
-                yield ExtraCycle(words, replace(once, count=count), zeroed)
+                yield replace(once, count=count, words=f"{name}: {what} read as well")
         # a step half-way between each two
         halved = [step for two in pairwise(case.steps) for step in (two[0], _between(*two))]
         every = enumerate([*halved, case.steps[-1]])
@@ -121,8 +106,8 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
         if not unloads(case):
             yield run(f"{name}: unloading too, the same loads back down", with_unloading(case))
         yield run(f"{name}: loads {LARGER:g} times as large", scale_loads(case, LARGER))
-        squeezed = replace(once, preload=PRELOAD_N)
-        yield ExtraCycle(f"{name}: under a follower load of {PRELOAD_N:g} N more", squeezed, zeroed)
+        words = f"{name}: under a follower load of {PRELOAD_N:g} N more"
+        yield replace(once, preload=PRELOAD_N, words=words)
         if not has_times(case):
             timed = at_times(case, times(case))
             yield run(f"{name}: time recorded, {STEP_S:g} s from load step to load step", timed)
@@ -130,8 +115,9 @@ def _variations(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
         yield run(f"{name}: {SLOWER:g} times as slow, time recorded", slow)
         held = f"{name}: largest load held for {HELD_S[-1] / 60:g} min, read along the way"
         yield run(held, with_hold(case))
-        if zeroed:
-            yield ExtraCycle(f"{name}: readings kept as they are, not zeroed", once, False)
+        if one.zeroed:
+            words = f"{name}: readings kept as they are, not zeroed"
+            yield replace(once, zeroed=False, words=words)
 
 
 def _between(before: LoadStep, after: LoadStep) -> LoadStep:
@@ -151,7 +137,7 @@ def _between(before: LoadStep, after: LoadStep) -> LoadStep:
     return replace(before, wrenches=wrenches, time=time)
 
 
-def _directions(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCycle]:
+def _directions(tests: Sequence[PlannedTest]) -> Iterator[PlannedTest]:
     """The largest moment, and the largest force, of any test along axes that no test has."""
     loads = [load for one in tests for load in _large(one.case)]
     for start in (3, 0):
@@ -174,7 +160,7 @@ def _directions(tests: Sequence[PlannedTest], zeroed: bool) -> Iterator[ExtraCyc
                 loads += _large(case)  # a test to both sides needs no other
                 what = "moment about" if start else "force along"
                 where = f"{what} {'+' if sign > 0.0 else '-'}{'xyz'[axis]} of ground"
-                yield ExtraCycle(f"new test: {name} ({where})", once.renamed(case), zeroed)
+                yield replace(once.renamed(case), words=f"new test: {name} ({where})")
 
 
 def _large(case: LoadCase) -> list[Array]:

@@ -7,19 +7,15 @@ of off are independent with mean off, so that several of them neither add up nor
 convention of signs.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
+from scipy.stats import norm
 
 from spinepipe.effects import PlaceSpread
-from spinepipe.effects.contract import Array, Indices
-from spinepipe.studies.discrepancy.design.fisher_information import (
-    CohortSignatures,
-    SpecimenSignatures,
-    candidates,
-)
+from spinepipe.effects.contract import Array
+from spinepipe.studies.discrepancy.design.signatures import CohortSignatures
 from spinepipe.studies.discrepancy.search.hypothesis import (
     CandidateForm,
     Trials,
@@ -27,7 +23,6 @@ from spinepipe.studies.discrepancy.search.hypothesis import (
     shape_grid,
     usual_shapes,
 )
-from spinepipe.studies.discrepancy.search.model_files import display_value
 from spinepipe.studies.discrepancy.search.screen import Group, Places, sides
 
 NO_TRACE = 1e-6
@@ -35,9 +30,6 @@ NO_TRACE = 1e-6
 
 ABSORBED = 0.98
 """Effects of which the base takes up more than this share are no effects beside it."""
-
-CLEAR = 0.9
-"""A test is worth doing for an effect if the base takes up no more than this share of it there."""
 
 OFTEN = 0.9
 """Probability with which an effect that counts as detectable is found."""
@@ -48,9 +40,11 @@ LARGEST = 3.0
 SPREADS = (PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.BY_SPECIMEN)
 """How a typical effect may differ between places; one place only if a trial knows none of these."""
 
-DRAWS = 200
 WEAKEST, STRONGEST = 1e-6, 1e3
 """Times the typical strength, between which the weakest is sought that is found."""
+
+LEAD = 3.0
+"""Log evidence of odds of 20 to 1: a lead from which one effect is told from another."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +55,7 @@ class Typical:
     ----------
     mean : (k,) prior SDs, of strengths that have one side. sd : (k,) of those that have two.
     signs : (k,) side of off that bounds allow, 0 for both.
-    raw, refitted, left : (k, k) products of the strengths' signatures; see `SpecimenSignatures`.
+    raw, refitted, left : (k, k) products of the strengths' signatures, `CohortSignatures.products`.
     """
 
     form: CandidateForm
@@ -102,11 +96,28 @@ class Typical:
         """Its strengths as a group on the screen."""
         return Group.of(self.left, self.signs)
 
+    def log_evidence(self, times: Array) -> Array:
+        """(S,) expected, that many times as strong as usual; the form's share not taken off."""
+        moments = self.left @ self.directions
+        return expected_log_evidence(self.group, moments[None], times[None])[0]
+
     @property
     def directions(self) -> Array:
         """(k, d) strengths whose squares add up to the expected one."""
         both = np.column_stack([self.mean, np.diag(self.sd)])
         return both[:, np.any(both != 0.0, axis=0)]
+
+
+def expected_log_evidence(group: Group, moments: Array, times: Array) -> Array:
+    """(A, S) log evidence of a group of strengths for effects A, times (A, S) as strong as usual.
+
+    ``moments`` : (A, k, d) of each, squares of its directions add up; the first gives the side.
+    """
+    onto = group.vectors.T @ moments
+    sizes = np.sqrt(np.sum(onto**2, axis=-1))
+    found = np.where(onto[..., 0] < 0.0, -sizes, sizes) @ group.vectors.T
+    result: Array = group.log_evidence(times[..., None] * found[:, None, :])
+    return result
 
 
 @dataclass(frozen=True)
@@ -116,12 +127,10 @@ class Detectable:
     Attributes
     ----------
     times : its typical strength. gap : that it makes after the base is refitted, in noise SD.
-    strengths : (parameter, value, unit) of its strengths, in the units of tables.
     """
 
     times: float
     gap: float
-    strengths: tuple[tuple[str, float, str], ...]
 
 
 @dataclass(frozen=True)
@@ -144,35 +153,19 @@ class Judgement:
     absorbed_by_base: float
     detectable: Detectable | None
 
-    @property
-    def clear(self) -> bool:
-        """Whether the tests show it at its typical strength, and much of it beside the base."""
-        typical = self.detectable is not None and self.detectable.times <= 1.0
-        return self.testable and typical and self.absorbed_by_base <= CLEAR
 
-
-def judgements(
-    trials: Sequence[Trials],
-    of: Mapping[str, SpecimenSignatures],
-    joints: int,
-    tests: Sequence[str],
-    needed: float,
-    seed: int,
-) -> tuple[Judgement, ...]:
+def judgements(design: CohortSignatures, needed: float) -> tuple[Judgement, ...]:
     """What the tests could tell of each effect.
 
     Parameters
     ----------
-    of : what each specimen's tests see. needed : log evidence, the screen's threshold and margin.
+    needed : log evidence, that of a sure effect and a lead over others.
     """
-    design = CohortSignatures(candidates(trials, joints, tests), of)
     judged = []
-    for number, one in enumerate(trials):
+    for number, one in enumerate(design.those.trials):
         # of each effect by the variant that shows best
-        best_forms = [_best_spread(design, number, variant) for variant in one.variants]
-        found = [
-            (form, _detectable(form, one, design.freedom, needed, seed)) for form in best_forms
-        ]
+        best_forms = [best_spread(design, number, variant) for variant in one.variants]
+        found = [(form, _detectable(form, one, design.freedom, needed)) for form in best_forms]
         # shown before not shown, then by how little is absorbed; a trace before none
         best, weakest = min(
             found,
@@ -187,7 +180,7 @@ def judgements(
     return tuple(judged)
 
 
-def _best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typical:
+def best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typical:
     """The form of a variant of which least is absorbed (to 1 %, then as declared first); of places,
     the one that shows most.
     """
@@ -199,56 +192,32 @@ def _best_spread(design: CohortSignatures, number: int, variant: Variant) -> Typ
     return max(ones, key=lambda one: one.squared(one.left))
 
 
-def _detectable(
-    one: Typical, trials: Trials, freedom: int, needed: float, seed: int
-) -> Detectable | None:
-    share = trials.log_share(one.form) - float(np.log(len(shape_grid(one.form.variant))))
-    times = _least(one, needed - share, seed) if one.seen else None
+def _detectable(one: Typical, trials: Trials, freedom: int, needed: float) -> Detectable | None:
+    times = _least(one, needed - log_share(one.form, trials)) if one.seen else None
     if times is None:
         return None
-    gap = times * float(np.sqrt(one.squared(one.refitted) / freedom))
-    return Detectable(times, gap, _strengths(one.form.variant, times))
+    return Detectable(times, times * float(np.sqrt(one.squared(one.refitted) / freedom)))
 
 
-def _strengths(variant: Variant, times: float) -> tuple[tuple[str, float, str], ...]:
-    """Strengths that many times as far from off as their defaults, in the units of tables."""
-    found = []
-    for column in variant.strengths:
-        p = variant.create().parameters[column]
-        assert p.off is not None
-        if p.logarithmic:
-            value = p.off * (p.default / p.off) ** times
-        else:
-            value = p.off + times * (p.default - p.off)
-        outside, unit = display_value(p.unit, float(value))
-        found.append((p.name, outside, unit))
-    return tuple(found)
+def log_share(form: CandidateForm, trials: Trials) -> float:
+    """Of a form at one shape, of the evidence of its effect."""
+    return trials.log_share(form) - float(np.log(len(shape_grid(form.variant))))
 
 
-def _least(one: Typical, needed: float, seed: int) -> float | None:
-    """Times the typical strength at which all but a few draws have the evidence needed."""
-    rng, count = np.random.default_rng(seed), len(one.mean)
-    if one.squared(one.left) <= NO_TRACE:
-        return None
-    # strengths (k, D) in random proportion, each of the squared size that is expected
-    patterns = one.mean[:, None] + one.sd[:, None] * rng.standard_normal((count, DRAWS))
-    squares = np.einsum("id,ij,jd->d", patterns, one.left, patterns)
-    patterns = patterns * np.sqrt(one.squared(one.left) / np.maximum(squares, NO_TRACE))
-    moved = one.left @ patterns
-    group = one.group
-    # noise of the moments is N(0, G), drawn by the eigenvectors of G
-    noise = np.sqrt(group.eigenvalues)[:, None] * rng.standard_normal((count, DRAWS))
-    noise = group.vectors @ noise
+def _least(one: Typical, needed: float) -> float | None:
+    """Times the typical strength at which all but a few data sets have the evidence needed."""
+    size = float(np.sqrt(one.squared(one.left)))
 
-    def short(log_times: float) -> float:
-        evidence = group.log_evidence((np.exp(log_times) * moved + noise).T)
-        return float(np.quantile(evidence, 1.0 - OFTEN)) - needed
+    def beyond(log_times: float) -> float:
+        return float(one.log_evidence(np.exp([log_times]))[0]) - needed
 
-    # the same draws at every size (common random numbers): evidence rises with it, one root
     ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
-    if short(ends[1]) <= 0.0:
+    if size**2 <= NO_TRACE or beyond(ends[1]) <= 0.0:
         return None
-    return float(np.exp(brentq(short, *ends, xtol=1e-3))) if short(ends[0]) < 0.0 else 0.0
+    # noise moves the effect by a normal number of SD one along its own direction, whose length is
+    # its size in noise SD: that much stronger than what has the evidence needed
+    evident = float(np.exp(brentq(beyond, *ends, xtol=1e-3)))
+    return evident + float(norm.ppf(OFTEN)) / size
 
 
 def _shown(one: Typical, least: Detectable | None) -> bool:
@@ -268,10 +237,7 @@ def _why(one: Typical, least: Detectable | None) -> str:
 
 def typical_form(design: CohortSignatures, number: int, form: CandidateForm) -> Typical:
     """A form of effect ``number`` under a design."""
-    index, start = design.those.indices[number], design.those.starts[number]
-    middle = usual_shapes(form.variant)
-    places, strengths = index.places(form, middle, tuple(design.of), design.those.tests)
-    count = len(strengths)
+    places, strengths = design.places(number, form, usual_shapes(form.variant))
     signs = sides(form, strengths)
     sizes = {}  # default of each strength, in prior SDs from off
     for column in form.variant.strengths:
@@ -280,20 +246,6 @@ def typical_form(design: CohortSignatures, number: int, form: CandidateForm) -> 
         off = np.log(p.default / p.off) if p.logarithmic else p.default - p.off
         sizes[column] = float(off) / p.prior_scale
     away = np.array([sizes[column] for column in strengths])
-    raw, refitted, left = (np.zeros((count, count)) for _ in range(3))
-    for specimen, columns, owners in places:
-        part, here, onto = design.of[specimen], np.ix_(columns, columns), summation(owners, count)
-        among_all = np.ix_(start + columns, start + columns)
-        raw += onto @ part.raw[number][here] @ onto.T
-        refitted += onto @ part.refitted[number][here] @ onto.T
-        left += onto @ part.left[among_all] @ onto.T
     one_sided = signs != 0.0
     mean, sd = np.where(one_sided, away, 0.0), np.where(one_sided, 0.0, away)
-    return Typical(form, places, mean, sd, signs, raw, refitted, left)
-
-
-def summation(owners: Indices, count: int) -> Array:
-    """(k, c) sums columns onto the strengths that own them."""
-    onto = np.zeros((count, len(owners)))
-    onto[owners, np.arange(len(owners))] = 1.0
-    return onto
+    return Typical(form, places, mean, sd, signs, *design.summed(places, len(strengths)))

@@ -145,9 +145,7 @@ def investigate(
     rules = Rules(
         trials(study.effects, ready.coordinates, specimens, joints),
         ready.coordinates,
-        study.margin,
         study.most_effects,
-        study.seed,
         # data that look wrong are no physics: nothing will be named, and a fit may take for ever
         0 if errors else MOST_FITS[study.effort],
     )

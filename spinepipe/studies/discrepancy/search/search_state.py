@@ -34,23 +34,26 @@ ELSE = 0.05
 
 @dataclass(frozen=True)
 class Rules:
-    """What a search may do. ``margin`` of log evidence within which a rival is told.
+    """What a search may do.
 
     ``most_fits`` : after which it ends with what it has.
     """
 
     trials: tuple[Trials, ...]
     coordinates: tuple[str, ...]
-    margin: float
     most_effects: int
-    seed: int
     most_fits: int = 10
 
     @property
     def needed(self) -> float:
         """Log evidence from which a single effect is sure beside nothing else."""
-        odds = PRIOR[0] * len(self.trials) / PRIOR[1]
-        return log(SURE / (1.0 - SURE)) + log(max(odds, 1.0))
+        return needed_of(len(self.trials))
+
+
+def needed_of(effects: int) -> float:
+    """Log evidence from which one of so many effects is sure beside nothing else."""
+    odds = PRIOR[0] * effects / PRIOR[1]
+    return log(SURE / (1.0 - SURE)) + log(max(odds, 1.0))
 
 
 @dataclass(frozen=True)
