@@ -167,7 +167,7 @@ def _trials(forms: Sequence[CandidateForm]) -> Trials:
 
 
 def rules(world: World, **more: Any) -> Rules:
-    given = {"margin": 3.0, "most_effects": 3, "seed": 0} | more
+    given = {"most_effects": 3} | more
     return Rules(world.trials, (EXTENSION, BENDING), **given)
 
 

@@ -4,14 +4,12 @@ from functools import cache
 
 import numpy as np
 from held_out_cases import CORRELATION, SD, cases, noise
-from sweeps import sweep
 
 from spinepipe.effects.contract import Array
 from spinepipe.studies.discrepancy.search.readings import Repeats
 from spinepipe.studies.discrepancy.search.whitening import (
     Whitening,
     joined,
-    rescaled,
     whitening,
     with_nuisances,
 )
@@ -113,15 +111,6 @@ def test_what_is_left_over_is_beside_the_most_likely_nuisances() -> None:
     np.testing.assert_allclose(white.left_over(residual), residual - moves @ likely, atol=CLOSE)
     expected = np.diagonal(np.linalg.inv(np.eye(len(moves)) + moves @ moves.T))
     np.testing.assert_allclose(white.freedom, expected, atol=CLOSE)
-
-
-@sweep("factors", [(1.0, 1.0, 1.0, 1.0), (2.0, 0.0, 0.3, 0.0)])
-def test_other_prior_sds_are_other_nuisances(factors: tuple[float, ...]) -> None:
-    white, root, _ = by_hand()
-    other = with_nuisances(whitening(recorded(), noise()), [one * factors for one in moved()])
-    found, expected = (one.shortened(root) for one in (rescaled(white, np.array(factors)), other))
-    np.testing.assert_allclose(found @ found.T, expected @ expected.T, rtol=1e-7)
-    np.testing.assert_allclose(found, expected, atol=CLOSE / SD)
 
 
 def test_readings_of_both_are_one_behind_the_other() -> None:

@@ -110,12 +110,6 @@ def with_nuisances(plain: Whitening, moved: Sequence[Array]) -> Whitening:
     return _with_moves(plain, *svd(plain.noise_only(moved)))
 
 
-def rescaled(white: Whitening, factors: Array) -> Whitening:
-    """The same with the prior SD of each nuisance (K,) times a factor; 0: it is known exactly."""
-    left, sizes, mixing = svd(white.sizes[:, None] * white.mixing * factors)
-    return _with_moves(white, white.directions @ left, sizes, mixing)
-
-
 def joined(first: Whitening, second: Whitening, moves: Array) -> Whitening:
     """Whitening of the readings of both, one behind the other; ``moves`` (N, K) in noise SD."""
     plain = Whitening(
