@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from spinepipe.decomposition import pinvh
 from spinepipe.effects.contract import Array, Indices
 from spinepipe.model import LoadCase, RefusedModel, SpineModel
 from spinepipe.studies.discrepancy.design.plans import PlannedTest, repeats_of, with_preloads
@@ -164,7 +165,7 @@ def _taken_out(jj: Array, jf: Array, ff: Array) -> Array:
     seen = sizes > 0.0
     scaled = jj[np.ix_(seen, seen)] / np.outer(sizes[seen], sizes[seen])
     onto = jf[seen] / sizes[seen, None]
-    result: Array = ff - onto.T @ np.linalg.pinv(scaled, rcond=SEEN, hermitian=True) @ onto
+    result: Array = ff - onto.T @ pinvh(scaled, rcond=SEEN) @ onto
     return result
 
 
