@@ -62,8 +62,8 @@ class Advice:
 def advice(
     found: SearchResult, ended: Outcome, place: Bench, run: PieceRunner
 ) -> tuple[Advice, ...]:
-    """All advice; nothing where data are wrong or everything is named."""
-    if ended.reason is Reason.DATA_ERRORS:
+    """All advice; nothing where data or the model's form are wrong, or everything is named."""
+    if ended.reason in (Reason.DATA_ERRORS, Reason.MOST_STAYS):
         return ()
     rows = [row for pair in _pairs(found, ended) for row in _of_pair(*pair, place, run)]
     tabled = found.with_tables

@@ -206,13 +206,15 @@ def log_share(form: CandidateForm, trials: Trials) -> float:
 
 def _least(one: Typical, needed: float) -> float | None:
     """Times the typical strength at which all but a few data sets have the evidence needed."""
-    size = float(np.sqrt(one.squared(one.left)))
+    if (squared := one.squared(one.left)) <= NO_TRACE:
+        return None
+    size = float(np.sqrt(squared))
 
     def beyond(log_times: float) -> float:
         return float(one.log_evidence(np.exp([log_times]))[0]) - needed
 
     ends = float(np.log(WEAKEST)), float(np.log(STRONGEST))
-    if size**2 <= NO_TRACE or beyond(ends[1]) <= 0.0:
+    if beyond(ends[1]) <= 0.0:
         return None
     # noise moves the effect by a normal number of SD one along its own direction, whose length is
     # its size in noise SD: that much stronger than what has the evidence needed
