@@ -1,42 +1,61 @@
 """The program `spinepipe`: finds the command, and turns errors into one clear message.
 
-A command is the module of that name in `spinepipe.cli`, with ``add_arguments(parser)`` and
-``run(options)``, which returns the exit code. It is imported when it is called for, so that
-`doctor` works where a library is missing.
+A command is a module of `spinepipe.cli` with a function ``command``, whose annotated parameters
+typer reads, and which returns the exit code (None: 0). It is imported when it is called for: help
+is at once there, and `doctor` works where a library is missing.
 """
 
-import argparse
 import os
+import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import wraps
 from importlib import import_module
 from io import TextIOWrapper
 from keyword import iskeyword
 from pathlib import Path
-from typing import cast
+from typing import Annotated, Any, cast
 
+import typer
+from typer.core import TyperGroup
+from typer.main import get_command
+
+from spinepipe import __version__
 from spinepipe.files import cache_home, cache_of_project, refusal
 
 COMMANDS = {
-    "import": "make a cohort of a testing machine's files",
-    "check": "say everything that is wrong with studies and cohorts",
-    "show": "print a specimen and write a page of it: curves, geometry",
-    "doctor": "test whether this computer can run the studies",
-    "export": "write a specimen's model as an OpenSim file",
-    "index": "write the page of all studies, results/index.html, and say which are up to date",
-    "compare": "set two studies side by side: what changed",
-    "plan": "say before an experiment which effects its tests could name",
-    "why": "say why an effect is named by a study, or why not",
-    "archive": "pack a computed study as a zip, for the supplement of a paper",
-    "docs": "write the generated parts of the documentation",
+    "Start": {
+        "import": "make a cohort from files of a testing machine, C3D, OpenSim",
+    },
+    "Look": {
+        "check": "say what is wrong with cohorts and studies",
+        "show": "show measured data: curves, geometry, summary",
+        "plan": "say before an experiment which effects its tests could name",
+    },
+    "Compute": {
+        "index": "write the page of all studies, and say which are up to date",
+        "why": "say why an effect is named by a study, or why not",
+    },
+    "Use": {
+        "compare": "set two studies side by side",
+        "export": "write a specimen's model as an OpenSim file",
+        "archive": "pack a computed study as a zip, for the supplement of a paper",
+    },
+    "Help": {
+        "doctor": "test this installation",
+        "docs": "write the generated parts of the documentation",
+    },
 }
-"""Each command with the line that help says of it."""
+"""Commands in groups, each with the line that help says of it."""
+
+FINE, PROBLEM, USAGE, FAILED, STOPPED = 0, 1, 2, 3, 130
+"""Exit codes: all well, a problem in the input, wrong usage, a job failed, stopped by Ctrl-C."""
+
+CONFIG = Path("config") / "config.yaml"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code: 0 well, 1 a problem.
-
-    Wrong usage ends the program with exit code 2, and `--help` with 0 (`SystemExit`, by argparse).
+    """Run one command and return its exit code.
 
     Parameters
     ----------
@@ -47,76 +66,114 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Python's texts as surrogates: they are printed as the same bytes, all else as UTF-8
         for stream in (sys.stdout, sys.stderr):
             cast(TextIOWrapper, stream).reconfigure(encoding="utf-8", errors="surrogateescape")
-    # this parser finds the command alone; its own arguments are read by a second one in `_run`
-    parser = argparse.ArgumentParser(
-        prog="spinepipe",
-        description="Spine models calibrated on measured motion.",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="commands:\n"
-        + "\n".join(f"  {name:8} {what}" for name, what in COMMANDS.items())
-        + "\n\n`spinepipe COMMAND --help` says more.",
-    )
-    _add_root(parser, Path.cwd())
-    parser.add_argument("command", choices=COMMANDS, metavar="COMMAND", help="see below")
-    parser.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
-    found = parser.parse_args(arguments)
-    return _run(found.command, found.rest, found.root)
-
-
-def _add_root(parser: argparse.ArgumentParser, default: Path) -> None:
-    """Let ``--root`` stand before the command as well as after it; what stands after it counts."""
-    parser.add_argument(
-        "--root",
-        type=Path,
-        default=default,
-        metavar="FOLDER",
-        help="folder of the Snakefile (default: where you are)",
-    )
-
-
-def _run(command: str, rest: Sequence[str], root: Path) -> int:
-    """Run a command with its own arguments and return its exit code.
-
-    Parameters
-    ----------
-    rest : what is typed after the command. root : folder of the Snakefile, unless told in ``rest``.
-    """
+    given = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    if "--root" in given:  # it may stand behind the command too
+        at = given.index("--root")
+        given = [*given[at : at + 2], *given[:at], *given[at + 2 :]]
     try:
+        _app(args=given, prog_name="spinepipe")
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else FINE
+    return FINE
+
+
+class _Commands(TyperGroup):
+    """Commands that are imported when they are called for, in groups."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return [name for group in COMMANDS.values() for name in group]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name not in self.list_commands(ctx):
+            return None
         # `import` is a word of Python, so its module is `import_`
-        module = import_module(f"spinepipe.cli.{command}{'_' if iskeyword(command) else ''}")
-    except ImportError as error:
-        return _fail(command, f"{error}; `spinepipe doctor` says what is missing")
-    parser = argparse.ArgumentParser(f"spinepipe {command}", description=COMMANDS[command])
-    _add_root(parser, root)
-    module.add_arguments(parser)
-    options = parser.parse_args(rest)
-    options.root = options.root.resolve()
-    # where the user's cache folder cannot be written, Matplotlib gets one inside the project; not
-    # under `doctor`, which looks at that folder itself and says what to do
-    if command != "doctor" and refusal(cache_home()):
-        os.environ["MPLCONFIGDIR"] = str(cache_of_project(options.root) / "matplotlib")
-    try:
-        code: int = module.run(options)
-    except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
-        # what is still to be printed goes nowhere, or Python would complain at its end
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except Exception as error:
+        module = f"spinepipe.cli.{cmd_name}{'_' if iskeyword(cmd_name) else ''}"
+        try:
+            function = import_module(module).command
+        except ImportError as error:
+            _fail(cmd_name, f"{error}; `spinepipe doctor` says what is missing")
+            raise typer.Exit(PROBLEM) from None
+        own = typer.Typer(add_completion=False, rich_markup_mode=None)
+        own.command(name=cmd_name)(_guarded(cmd_name, function))
+        return get_command(own)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        for group, commands in COMMANDS.items():
+            with formatter.section(group):
+                formatter.write_dl(list(commands.items()))
+
+
+def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., None]:
+    """A command whose errors that a user can mend end in one message."""
+
+    @wraps(function)
+    def run(*args: Any, **given: Any) -> None:
         from spinepipe.marks import DamagedFile
         from spinepipe.model.spine import RefusedModel
         from spinepipe.problems import InputError
 
-        # these say what the user can mend, in one line; any other is a fault of ours, and is shown
-        # with its traceback
-        if not isinstance(error, DamagedFile | InputError | RefusedModel | OSError | ImportError):
-            raise
-        if isinstance(error, OSError) and error.filename:
-            return _fail(command, f"{error.filename}: {error.strerror}")
-        return _fail(command, str(error))
-    return code
+        try:
+            code = function(*args, **given) or FINE
+        except KeyboardInterrupt:
+            code = STOPPED
+        except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
+            # what is still to be printed goes nowhere, or Python would complain at its end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            code = FINE
+        except (DamagedFile, InputError, RefusedModel, OSError, ImportError) as error:
+            # these say what the user can mend, in one line; any other is a fault of ours, and is
+            # shown with its traceback
+            named = isinstance(error, OSError) and error.filename
+            code = _fail(name, f"{error.filename}: {error.strerror}" if named else str(error))
+        raise typer.Exit(code)
+
+    return run
+
+
+def _version(given: bool) -> None:
+    if given:
+        print(f"spinepipe {__version__} (Python {platform.python_version()}, {platform.system()})")
+        raise typer.Exit()
+
+
+def project_root(start: Path) -> Path:
+    """The nearest folder upwards with config/config.yaml; the start where there is none."""
+    return next((one for one in (start, *start.parents) if (one / CONFIG).is_file()), start)
+
+
+_app = typer.Typer(
+    cls=_Commands,
+    help="How stiff spinal joints are, how sure that is, and what a model is missing.",
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+@_app.callback()
+def _begin(
+    context: typer.Context,
+    root: Annotated[
+        Path | None,
+        typer.Option(
+            "-C",
+            "--root",
+            metavar="DIR",
+            help="project folder (default: the nearest with config/config.yaml)",
+        ),
+    ] = None,
+    version: Annotated[
+        bool,
+        typer.Option("--version", is_eager=True, callback=_version, help="show the version"),
+    ] = False,
+) -> None:
+    context.obj = (root or project_root(Path.cwd())).resolve()
+    # where the user's cache folder cannot be written, Matplotlib gets one inside the project; not
+    # under `doctor`, which looks at that folder itself and says what to do
+    if context.invoked_subcommand != "doctor" and refusal(cache_home()):
+        os.environ["MPLCONFIGDIR"] = str(cache_of_project(context.obj) / "matplotlib")
 
 
 def _fail(command: str, message: str) -> int:
-    """Print a message to stderr; exit code 1."""
+    """Print a message to stderr; the exit code of a problem."""
     print(f"spinepipe {command}: {message}", file=sys.stderr)
-    return 1
+    return PROBLEM
