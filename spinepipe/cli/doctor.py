@@ -169,9 +169,13 @@ def check_cache(root: Path) -> str:
 
 
 def check_cores(root: Path) -> str:
-    """How many cores this process may use."""
+    """How many cores a run takes."""
+    return f"{cores_here()}; `spinepipe run` takes all of them, -j N takes N"
+
+
+def cores_here() -> int:
+    """Cores that this process may use."""
     try:
-        cores = len(os.sched_getaffinity(0))
+        return len(os.sched_getaffinity(0))
     except AttributeError:  # only Linux tells which cores a process may use
-        cores = os.cpu_count() or 1
-    return f"{cores}; run `snakemake --cores {cores}`"
+        return os.cpu_count() or 1

@@ -96,9 +96,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if "--root" in own:  # it may stand behind the command too
         at = own.index("--root")
         own = [*own[at : at + 2], *own[:at], *own[at + 2 :]]
-    given = [*first, *own, *rest]
+    # what stands behind `--` is for Snakemake: typer would take it for names
+    given = [*first, *own]
     try:
-        code: object = _app(args=given, prog_name="spinepipe", standalone_mode=False)
+        code: object = _app(args=given, prog_name="spinepipe", standalone_mode=False, obj=rest[1:])
     except TyperException as error:  # an option or a value that no command has
         words = error.format_message().removesuffix(".")
         of = getattr(error, "ctx", None)
@@ -155,6 +156,10 @@ def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., No
         data: Any = {}
         try:
             with hidden:
+                if given["context"].meta["rest"] and name != "run":
+                    raise WrongUsage(
+                        f"{name} hands nothing to Snakemake", "leave out what follows --"
+                    )
                 code = function(*args, **given) or FINE
             data = given["context"].meta.get("data")
             if asked["json"] and data is None:
@@ -230,6 +235,7 @@ def _begin(
         typer.Option("--version", is_eager=True, callback=_version, help="show the version"),
     ] = False,
 ) -> None:
+    context.meta["rest"] = context.obj
     context.obj = (root or project_root(Path.cwd())).resolve()
     # where the user's cache folder cannot be written, Matplotlib gets one inside the project; not
     # under `doctor`, which looks at that folder itself and says what to do
