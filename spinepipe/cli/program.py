@@ -25,6 +25,7 @@ from spinepipe.files import cache_home, cache_of_project, refusal
 
 COMMANDS = {
     "Start": {
+        "init": "make a project folder (with --demo: with an example, computed)",
         "import": "make a cohort from files of a testing machine, C3D, OpenSim",
     },
     "Look": {
