@@ -1,5 +1,6 @@
 """`spinepipe init [DIR]`: a project folder to work in, with the example as a first answer."""
 
+import shlex
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -62,7 +63,7 @@ def command(
     print(f"Made {folder}: {_named(made)}" if made else f"{folder}: nothing to add, all is there")
     if other:
         print(f"Left as they are, since they differ from what would be written: {_named(other)}")
-    into = "" if root == Path.cwd() else f"cd {folder}; "
+    into = "" if root == Path.cwd() else f"cd {shlex.quote(str(folder))}; "
     if demo:
         return _run_demo(root, into)
     print(f"Next: {into}spinepipe import YOUR_FILE.csv")
