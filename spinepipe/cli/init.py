@@ -1,15 +1,13 @@
 """`spinepipe init [DIR]`: a project folder to work in, with the example as a first answer."""
 
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from spinepipe.cli.program import CONFIG, FAILED, FINE, PROBLEM
+from spinepipe.cli.program import CONFIG, FINE, WrongUsage
 from spinepipe.files import appearing, refusal
 from spinepipe.shipped import SHIPPED
 
@@ -51,9 +49,8 @@ def command(
     """Make a project folder: config/config.yaml, config/cohorts, config/studies, results."""
     root = folder.resolve()
     if why := refusal(root):
-        print(f"error: {folder} cannot be a project folder: {why}", file=sys.stderr)
-        print("  name another one: spinepipe init DIR", file=sys.stderr)
-        return PROBLEM
+        what = f"{folder} cannot be a project folder: {why}"
+        raise WrongUsage(what, "name another one: spinepipe init DIR")
     texts = {"Snakefile": _SNAKEFILE, str(CONFIG): _CONFIG.format(studies=DEMO if demo else "")}
     copied = dict(_copied(demo, examples, slurm))
     made, other = _write(root, {} if root == SHIPPED else {**texts, **copied})
@@ -64,10 +61,10 @@ def command(
     if other:
         print(f"Left as they are, since they differ from what would be written: {_named(other)}")
     into = "" if root == Path.cwd() else f"cd {shlex.quote(str(folder))}; "
-    if demo:
-        return _run_demo(root, into)
-    print(f"Next: {into}spinepipe import YOUR_FILE.csv")
-    return FINE
+    code = _run_demo(context, root) if demo else FINE
+    if code == FINE:
+        print(f"Next: {into}spinepipe import YOUR_FILE.csv")
+    return code
 
 
 def _copied(demo: bool, examples: bool, slurm: bool) -> Iterator[tuple[str, Path]]:
@@ -106,19 +103,21 @@ def _named(names: list[str]) -> str:
     return ", ".join(told[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
-def _run_demo(root: Path, into: str) -> int:
-    """Compute the example; what it says, where its report is, and what to do next."""
-    print(f"Computing {DEMO}: about {DEMO_SECONDS} s", flush=True)
-    report = Path("results") / DEMO / "report.html"
-    ended = subprocess.run(
-        [sys.executable, "-m", "snakemake", "--cores", "all", str(report)], cwd=root, check=False
-    )
-    if ended.returncode:
-        return FAILED
+def _run_demo(context: typer.Context, root: Path) -> int:
+    """Compute the example; print what it says and where its report is."""
+    # here: a folder without an example is made at once
+    from spinepipe.cli.doctor import cores_here
+    from spinepipe.cli.run import Watched
+    from spinepipe.jobs.start import Snakemake
     from spinepipe.report.overview.stored import stored_conclusions
 
-    answers = (told.text for told in stored_conclusions(root / report.parent))
-    print(f"\n{next(answers, '')}")
-    print(f"Report: {root / report}")
-    print(f"Next: {into}spinepipe import YOUR_FILE.csv")
-    return FINE
+    print(f"Computing {DEMO}: about {DEMO_SECONDS} s", flush=True)
+    report = Path("results") / DEMO / "report.html"
+    asked = context.find_root().params
+    run = Snakemake(root, [str(report), "--cores", f"{cores_here()}"], DEMO)
+    code = Watched(run, silent=asked["quiet"] or asked["json"]).watch()
+    if code == FINE:
+        answers = (told.text for told in stored_conclusions(root / report.parent))
+        print(f"{next(answers, '')}\nReport: {root / report}")
+        context.meta["data"]["report"] = str(root / report)
+    return code
