@@ -21,13 +21,19 @@ export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
 export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 endif
 
-.PHONY: all full test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
+.PHONY: all full demo wheel test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
 
 all: env  ## build the studies that config/config.yaml chooses
 	$(BIN)/python -m spinepipe.jobs.if_changed all $(BIN)/snakemake -j$(CORES) all
 
 full: env  ## build the long studies too, and what takes long of the others
 	$(BIN)/python -m spinepipe.jobs.if_changed full $(BIN)/snakemake -j$(CORES) full
+
+demo: env  ## a first answer: compute the example l4l5_disc
+	$(BIN)/spinepipe init --demo
+
+wheel: env  ## dist/spinepipe-*.whl, which holds the workflow and the examples too; no network
+	$(BIN)/python -m pip wheel --quiet --no-deps --no-index --no-build-isolation --wheel-dir dist .
 
 test: dev-env  ## run the tests that a change must pass
 	$(PYTEST) -m "not full"
@@ -71,7 +77,7 @@ dev-env: $(VENV)/dev.done
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/runtime.done: $(VENV)/bin/python requirements.lock pyproject.toml workflow/plugins/pyproject.toml
+$(VENV)/runtime.done: $(VENV)/bin/python requirements.lock pyproject.toml setup.py workflow/plugins/pyproject.toml
 	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation --editable . --editable workflow/plugins
 	$(BIN)/python -m spinepipe.cli.engine >/dev/null  # compiles the kernels, else the first study waits for it
@@ -92,4 +98,4 @@ LOCK := --python-version 3.11 --generate-hashes --no-emit-index-url --no-header 
 	--no-annotate --prerelease=if-necessary
 
 clean:  ## remove the environment, results and engine state
-	rm -rf $(VENV) results .snakemake
+	rm -rf $(VENV) results .snakemake build dist

@@ -1,10 +1,12 @@
 # The front door: which studies are computed. What is computed of each: workflow/rules.
 import sys
+from pathlib import Path
 
 from snakemake.utils import min_version
 
 min_version("9.27")
-sys.path.insert(0, workflow.basedir)
+if Path(workflow.basedir, "spinepipe", "__init__.py").is_file():  # in a clone its own copy counts
+    sys.path.insert(0, workflow.basedir)
 
 
 include: "workflow/rules/common.smk"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from spinepipe.api.stiffness import calibrate
     from spinepipe.problems import InputError
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "InputError",

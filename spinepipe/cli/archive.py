@@ -26,6 +26,7 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.page.origin import origin
 from spinepipe.report.words import count
 from spinepipe.schema.datapackage import FILE
+from spinepipe.shipped import SHIPPED
 from spinepipe.studies import read as studies
 from spinepipe.studies.base_model import made_by
 from spinepipe.studies.study import STUDIES, Study
@@ -105,8 +106,8 @@ def command(
                 elsewhere.add(f"{sha256(path.read_bytes()).hexdigest()}  {shown}")
     packed[f"{files.folder}/{FILE}"] = told.encode()
     packed["config/config.yaml"] = f"studies: [{name}]\n".encode()
-    if (_CODE / "requirements.lock").is_file():
-        packed["requirements.lock"] = (_CODE / "requirements.lock").read_bytes()
+    if (SHIPPED / "requirements.lock").is_file():
+        packed["requirements.lock"] = (SHIPPED / "requirements.lock").read_bytes()
     packed["README.txt"] = _readme(expected, packed, tables, elsewhere, run_by).encode()
     with appearing(output) as temporary, ZipFile(temporary, "w") as file:
         for within, content in sorted(packed.items()):

@@ -31,6 +31,7 @@ from spinepipe.problems import nearest
 
 COMMANDS = {
     "Start": {
+        "init": "make a project folder (with --demo: with an example, computed)",
         "import": "make a cohort from files of a testing machine, C3D, OpenSim",
     },
     "Look": {

@@ -1,7 +1,6 @@
 """The way to the folder `papers`: published numbers, and what sets them beside those of a run.
 
-It lies beside this package and is not installed with it. Where it is not there, a study leaves the
-comparison out and says so.
+Where it does not come along with this package, a study leaves the comparison out and says so.
 """
 
 import hashlib
@@ -13,7 +12,9 @@ from typing import Any
 
 import pandas as pd
 
-FOLDER = Path(__file__).resolve().parents[2] / "papers"
+from spinepipe.shipped import SHIPPED
+
+FOLDER = SHIPPED / "papers"
 
 
 def beside() -> bool:

@@ -10,13 +10,25 @@ from dataclasses import dataclass
 from importlib.metadata import Distribution, distribution
 from pathlib import Path
 
-LOCK = Path(__file__).resolve().parents[2] / "requirements.lock"
+from spinepipe.shipped import SHIPPED
+
+LOCK = SHIPPED / "requirements.lock"
 
 _PINNED = re.compile(r"^([A-Za-z0-9._-]+)==([^\s;\\]+)", re.MULTILINE)
 
 ALLOWED = frozenset(
     (
-        *("MIT", "MIT-CMU", "BSD", "BSD-2-Clause", "BSD-3-Clause", "0BSD", "Apache-2.0", "Zlib"),
+        *(
+            "MIT",
+            "MIT-CMU",
+            "ISC",
+            "BSD",
+            "BSD-2-Clause",
+            "BSD-3-Clause",
+            "0BSD",
+            "Apache-2.0",
+            "Zlib",
+        ),
         *("PSF-2.0", "BSL-1.0", "CC0-1.0", "MPL-2.0", "Apache-2.0 WITH LLVM-exception", "Qhull"),
     )
 )
@@ -24,6 +36,7 @@ ALLOWED = frozenset(
 
 _BY_CLASSIFIER = {
     "MIT License": "MIT",
+    "ISC License (ISCL)": "ISC",
     "BSD License": "BSD",
     "Apache Software License": "Apache-2.0",
     "Mozilla Public License 2.0 (MPL 2.0)": "MPL-2.0",

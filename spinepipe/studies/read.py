@@ -233,7 +233,7 @@ class Selection(BaseModel):
 
     model_config = FORM
 
-    studies: _Names = Field(min_length=1, description="studies that a plain run builds")
+    studies: _Names = Field(description="studies that a plain run builds; none in a new project")
     full: _Names = Field(default=(), description="further studies, built by `make full` only")
 
 

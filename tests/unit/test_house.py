@@ -25,6 +25,7 @@ PACKAGE = "spinepipe"
 
 ROOMS = (
     *(
+        "shipped",
         "status",
         "units",
         "problems",

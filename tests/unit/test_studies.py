@@ -229,7 +229,6 @@ def test_every_field_of_a_study_is_described() -> None:
     "content, key, says",
     [
         ("studies: [prob]\n", "studies.0", "did you mean 'probe'"),
-        ("studies: []\n", "studies", "at least 1 of them"),
         ("studies: probe\n", "studies", "a list"),
         ("study: [probe]\n", "study", "did you mean 'studies'"),
         ("studies: [probe]\nfull: [probe]\n", "full.0", "again"),
