@@ -8,7 +8,7 @@ import typer
 
 from spinepipe import cohort as cohorts
 from spinepipe.cli.import_questions import SETTINGS, Questions, described, document_of
-from spinepipe.cli.program import STOPPED
+from spinepipe.cli.program import STOPPED, WrongUsage
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.files import appearing
 from spinepipe.imports.file_patterns import with_files
@@ -82,13 +82,13 @@ def command(
     if files[0].suffix in (".yaml", ".yml"):
         told = (cohort, pattern, vertebrae, accuracy_deg)
         if len(files) > 1 or yes or any(one is not None for one in told):
-            raise typer.BadParameter("one .yaml says it all: correct it instead")
+            raise WrongUsage(f"{files[0]} with further files or answers", "write them in it")
         if show:
             return _show(files[0], root)
         document, settings = read_settings(files[0]), files[0]
     else:
         if show:
-            raise typer.BadParameter("--show is for a .yaml; with data files there is --dry-run")
+            raise WrongUsage("--show with data files", "write --dry-run instead")
         try:
             folder, text = described(
                 files, Questions(yes), pattern, cohort, vertebrae, accuracy_deg
@@ -125,10 +125,8 @@ def _imported(
     except InputError:
         told = "No cohort was written."
         if not dry_run:
-            told += (
-                f" After mending {settings}, spinepipe import {settings} goes on; with --show it "
-            )
-            told += "shows the files as they are understood."
+            told += f" `spinepipe import --show {settings}` shows the files as they are understood; "
+            told += f"after mending {settings}, spinepipe import {settings} goes on."
         print(told)
         raise
     for sentence in imported.sentences:
