@@ -125,7 +125,9 @@ def _imported(
     except InputError:
         told = "No cohort was written."
         if not dry_run:
-            told += f" `spinepipe import --show {settings}` shows the files as they are understood; "
+            told += (
+                f" `spinepipe import --show {settings}` shows the files as they are understood; "
+            )
             told += f"after mending {settings}, spinepipe import {settings} goes on."
         print(told)
         raise

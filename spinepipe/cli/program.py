@@ -32,6 +32,7 @@ from spinepipe.problems import nearest
 COMMANDS = {
     "Start": {
         "import": "make a cohort from files of a testing machine, C3D, OpenSim",
+        "new": "write a cohort or study to fill in; say what a cohort can answer",
     },
     "Look": {
         "check": "say what is wrong with cohorts and studies",

@@ -78,5 +78,7 @@ KIND = Kind(
     holds=True,
     exports="export:exported",
     explains="why:why",
-    plans="plan:plan",
+    before_data="before_data:prospects",
+    starter="base: {stiffness: per_specimen}  # what is asked what it lacks: linear joints\n"
+    "# effort: standard  # quick (the default) fits 10 models, standard 40, full 100\n",
 )
