@@ -72,7 +72,7 @@ def command(
     ] = None,
     to: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="with --design: .csv or .parquet [NAME_design.csv]"),
+        typer.Option(metavar="FILE", help="with --design: .csv or .parquet [NAME.csv]"),
     ] = None,
     vertebrae: Annotated[
         str | None, typer.Option(help='of a cohort, from the lowest, as in "S1 L5 L4"')
@@ -114,7 +114,7 @@ def command(
     sizes = misfit or [0.5, 0.2]
     if min(sizes) <= 0.0:
         raise WrongUsage(f"--misfit {min(sizes):g}", "sizes are above 0")
-    return _before_data(root, name, cycles, sizes, to or Path(f"{name}_design.csv"))
+    return _before_data(root, name, cycles, sizes, to or Path(f"{name}.csv"))
 
 
 def _chosen(read: Cohort, name: str, yes: bool) -> str:

@@ -131,7 +131,7 @@ class Kind:
         cohort, the folder of the Snakefile, cycles of each test, misfits, and where the table goes,
         it yields lines.
     starter : further lines of a new study file, with what stands in them as a remark.
-    cost : how long a study of few specimens takes, in words; empty where it is not known.
+    cost : how much a study as `starter` has it computes, in words; empty where it hangs on data.
     question : what its studies ask, in a few words: the heading above them on the page of all.
     doubts : ``file:function`` of what most likely is wrong with files that it alone reads; called
         with a cohort that has any of them, it yields doubts.

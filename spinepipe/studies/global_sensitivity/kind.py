@@ -139,6 +139,7 @@ _ANALYSING = ("bootstraps", "confidence", "indices", "most_failed", "outputs")
 
 KIND = Kind(
     question="Which inputs matter?",
+    cost="256 runs times factors and two, each specimen",
     starter="stiffness: fitted\n"
     "factors:  # what is uncertain, and how far\n"
     "  - {of: stiffness, coordinate: extension, times: {low: 0.8, high: 1.25}}\n"
