@@ -7,13 +7,15 @@ from typing import Annotated
 import typer
 
 from spinepipe import cohort as cohorts
+from spinepipe.cli.import_questions import SETTINGS, Questions, described, document_of
+from spinepipe.cli.program import STOPPED, WrongUsage
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.files import appearing
 from spinepipe.imports.file_patterns import with_files
 from spinepipe.imports.imported import write
 from spinepipe.imports.judge import judge, write_judged
-from spinepipe.imports.registry import read, read_settings
-from spinepipe.problems import InputError
+from spinepipe.imports.registry import of_document, read, read_settings
+from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.specimen import view_of
 from spinepipe.report.specimen_page import specimen_page
 from spinepipe.report.words import listed
@@ -27,37 +29,123 @@ RAW_FILES, RAW_LINES, RAW_WIDTH = 10, 8, 100
 
 def command(
     context: typer.Context,
-    settings: Annotated[Path, typer.Argument(metavar="FILE.yaml", help="says what the files are")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILES...",
+            help="files of a testing machine (.csv .txt .tsv .lvm .xlsx), or the .yaml that tells "
+            "what files are and repeats an import",
+        ),
+    ],
+    cohort: Annotated[str | None, typer.Option(help="name of the cohort")] = None,
+    pattern: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help='where specimen and test stand in the names, as in "{specimen}_{test}.csv"',
+        ),
+    ] = None,
+    vertebrae: Annotated[
+        str | None, typer.Option(metavar="TEXT", help='from the lowest, as in "L5 L4"')
+    ] = None,
+    accuracy_deg: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEG",
+            help="accuracy of one angle, as its maker or your calibration states it",
+        ),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="take every suggestion")] = False,
     replace: Annotated[
-        bool, typer.Option("--replace", help="write a cohort again; files edited by hand stay")
+        bool,
+        typer.Option(
+            "--replace",
+            help="write a cohort again that is there; files that are edited by hand stay",
+        ),
     ] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="show it all, write nothing")] = False,
     show: Annotated[
-        bool, typer.Option("--show", help="write no cohort: show what was understood, and a page")
+        bool,
+        typer.Option(
+            "--show",
+            help="with a .yaml: write no cohort, show the first rows as they were understood, and "
+            "draw a page",
+        ),
     ] = False,
 ) -> int:
-    """Make a cohort from files of a testing machine, C3D, OpenSim."""
-    root = context.obj
-    if show:
-        return _show(settings, root)
+    """Make a cohort of files of a testing machine, of motion, or of a model.
+
+    Data files start questions, whose answers are written as import.yaml beside them; that file
+    repeats the import.
+    """
+    root: Path = context.obj
+    if files[0].suffix in (".yaml", ".yml"):
+        told = (cohort, pattern, vertebrae, accuracy_deg)
+        if len(files) > 1 or yes or any(one is not None for one in told):
+            raise WrongUsage(f"{files[0]} with further files or answers", "write them in it")
+        if show:
+            return _show(files[0], root)
+        document, settings = read_settings(files[0]), files[0]
+    else:
+        if show:
+            raise WrongUsage("--show with data files", "write --dry-run instead")
+        try:
+            folder, text = described(
+                files, Questions(yes), pattern, cohort, vertebrae, accuracy_deg
+            )
+        except typer.Abort:
+            print("Stopped; nothing was written. With --yes every suggestion is taken.")
+            return STOPPED
+        document, settings = document_of(text), folder / SETTINGS
+        if dry_run:
+            print(f"{settings} would be:\n\n{text}")
+        elif settings.exists() and not replace:
+            found, allowed = "a file of this name", "a new file"
+            remedy = f"repeat it: spinepipe import {settings}; or add --replace to write it anew"
+            raise InputError([InputProblem(str(settings), None, None, found, allowed, remedy)])
+        else:
+            with appearing(settings) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+            print(f"Wrote {settings}, which repeats this import.")
+    return _imported(document, settings, root, replace, dry_run)
+
+
+def _imported(
+    document: YamlDocument, settings: Path, root: Path, replace: bool, dry_run: bool
+) -> int:
+    """Read all files, judge them, write the folder, and say what was done."""
     try:
-        imported = read(settings)
+        imported = of_document(settings.parent, document)
         folder = root / COHORTS / imported.name
-        stayed, warnings = write_judged(imported, folder, replace)
+        if dry_run:
+            with TemporaryDirectory() as place:
+                stayed, warnings = write_judged(imported, Path(place) / imported.name, False)
+        else:
+            stayed, warnings = write_judged(imported, folder, replace)
     except InputError:
-        told = f"Nothing was written. `spinepipe import --show {settings}` shows the files"
-        print(f"{told} as they are understood.")
+        told = "No cohort was written."
+        if not dry_run:
+            told += (
+                f" `spinepipe import --show {settings}` shows the files as they are understood; "
+            )
+            told += f"after mending {settings}, spinepipe import {settings} goes on."
+        print(told)
         raise
     for sentence in imported.sentences:
         print(sentence)
-    print(f"Wrote {COHORTS / imported.name}.")
+    print("Nothing was written." if dry_run else f"Wrote {COHORTS / imported.name}.")
     if stayed:
         print(f"{listed(stayed)} were there and stayed as they are.")
     for name, remark in imported.by_hand.items():
-        if remark and name not in stayed:
+        if remark and name not in stayed and not dry_run:
             print(remark)
     for warning in warnings:
         print(f"warn  {warning}")
-    print(f"Next: spinepipe check {imported.name}, then spinepipe show {imported.name}.")
+    if dry_run:
+        print("Next: the same without --dry-run.")
+    else:
+        name = imported.name
+        print(f"Next: spinepipe show {name}, then spinepipe new study NAME --cohort {name}")
     return 0
 
 

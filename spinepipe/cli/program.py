@@ -33,6 +33,7 @@ COMMANDS = {
     "Start": {
         "init": "make a project folder (with --demo: with an example, computed)",
         "import": "make a cohort from files of a testing machine, C3D, OpenSim",
+        "new": "write a cohort or study to fill in; say what a cohort can answer",
     },
     "Look": {
         "check": "say what is wrong with cohorts and studies",

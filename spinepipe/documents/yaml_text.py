@@ -60,8 +60,11 @@ def read_yaml(path: Path, file: str) -> tuple[YamlDocument | None, list[InputPro
     file : its name in messages.
     """
     text, problems = read_text(path, file, MOST_YAML_BYTES)
-    if problems:
-        return None, problems
+    return (None, problems) if problems else yaml_of_text(text, file)
+
+
+def yaml_of_text(text: str, file: str) -> tuple[YamlDocument | None, list[InputProblem]]:
+    """As `read_yaml`, of a text that may be in no file yet."""
     try:
         problems = list(_beyond_bounds(text, file))
         return (None, problems) if problems else _document(text, file)

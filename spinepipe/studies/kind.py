@@ -127,8 +127,11 @@ class Kind:
         warns of.
     explains : ``file:function`` of what `spinepipe why` says; called with the folder of a study's
         results and a name, it yields lines.
-    plans : ``file:function`` of what `spinepipe plan` says; called with study, cohort, the folder
-        of the Snakefile, cycles of each test, misfits, and where the table goes, it yields lines.
+    before_data : ``file:function`` of what `spinepipe new study --design` says; called with study,
+        cohort, the folder of the Snakefile, cycles of each test, misfits, and where the table goes,
+        it yields lines.
+    starter : further lines of a new study file, with what stands in them as a remark.
+    cost : how much a study as `starter` has it computes, in words; empty where it hangs on data.
     question : what its studies ask, in a few words: the heading above them on the page of all.
     doubts : ``file:function`` of what most likely is wrong with files that it alone reads; called
         with a cohort that has any of them, it yields doubts.
@@ -151,7 +154,9 @@ class Kind:
     told_by_check: str | None = None
     doubts: str | None = None
     explains: str | None = None
-    plans: str | None = None
+    before_data: str | None = None
+    starter: str = ""
+    cost: str = ""
     question: str = "Other questions"
 
     def job(self, name: str) -> Job:

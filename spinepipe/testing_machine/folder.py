@@ -38,6 +38,7 @@ from spinepipe.testing_machine.precision import (
 )
 from spinepipe.testing_machine.recording import Recording
 from spinepipe.testing_machine.settings import MachineMapping
+from spinepipe.testing_machine.shared_faults import told_once
 
 BY_HAND = {
     "joints.csv": "joints.csv is a template: it has the first joint at the origin, all axes along "
@@ -103,7 +104,7 @@ def read(folder: Path, document: YamlDocument) -> ImportedTests:
     for group in recordings.values():
         problems += _not_the_same(group)
     if problems:
-        raise InputError(problems)
+        raise InputError(told_once(expanded, mapping, problems))
     tests = []
     for group in recordings.values():
         try:

@@ -68,6 +68,7 @@ JUMP = 0.1
 SERIAL_DAYS, SHORT_DAYS = (30_000, 60_000), 0.5
 """Days since 1900 of 1982 to 2064, and longer than any test."""
 
+NO_COLUMN = "no such column"
 BELOW_UNITS = "set `form: {first_line:"
 
 FEWEST_LINES = 10
@@ -257,7 +258,7 @@ def _place(
         remedy = "a name ends at a blank there: tell the column's number"
     free = [name for name in names if name not in {one.column for one in channels}]
     remedy = (_where(table, channels) if names else "") or mistyped(str(column), free, remedy)
-    return InputProblem(file, line, str(column), "no such column", one_of(known), remedy)
+    return InputProblem(file, line, str(column), NO_COLUMN, one_of(known), remedy)
 
 
 def _where(table: RawTable, channels: Sequence[Channel]) -> str:

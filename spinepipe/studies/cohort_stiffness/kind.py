@@ -257,6 +257,7 @@ _FITTING = ("seed", "steps", "cost", "measurement_sd", "bound_factor", "starts")
 
 KIND = Kind(
     question="How stiff are the joints?",
+    cost="a fit for each model; comparisons need 3 specimens",
     settings=CohortStiffness,
     files=CohortLayout,
     checks=(check_cohort_stiffness,),

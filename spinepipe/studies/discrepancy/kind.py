@@ -78,5 +78,8 @@ KIND = Kind(
     holds=True,
     exports="export:exported",
     explains="why:why",
-    plans="plan:plan",
+    before_data="before_data:prospects",
+    cost="quick: at most 10 fits of all readings",
+    starter="base: {stiffness: per_specimen}  # what is asked what it lacks: linear joints\n"
+    "# effort: standard  # quick (the default) fits 10 models, standard 40, full 100\n",
 )

@@ -139,6 +139,13 @@ _ANALYSING = ("bootstraps", "confidence", "indices", "most_failed", "outputs")
 
 KIND = Kind(
     question="Which inputs matter?",
+    cost="256 runs times factors and two, each specimen",
+    starter="stiffness: fitted\n"
+    "factors:  # what is uncertain, and how far\n"
+    "  - {of: stiffness, coordinate: extension, times: {low: 0.8, high: 1.25}}\n"
+    "  - {of: joint_centre, axis: anterior, offset_mm: {sd: 2}}\n"
+    "  - {of: load_direction, axis: z, offset_deg: {sd: 2}}\n"
+    "design: {method: sobol, samples: 256}\n",
     settings=GlobalSensitivity,
     files=SensitivityFiles,
     checks=(check_global_sensitivity,),

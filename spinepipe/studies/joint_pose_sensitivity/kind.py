@@ -186,6 +186,7 @@ _ANALYSES = (
 
 KIND = Kind(
     question="How stiff are the joints?",
+    cost="500 poses, a fit of each",
     settings=JointPoseSensitivity,
     files=JointPoseFiles,
     checks=(check_joint_pose_sensitivity,),

@@ -91,6 +91,9 @@ _FRAMES = ("poses", "pose_sd")
 
 KIND = Kind(
     question="How far do the joints move?",
+    cost="10 poses, a run of each test",
+    starter="poses: 10\n"
+    "pose_sd: {translation_mm: 1.0, rotation_deg: 3.0}  # of joint frames, as from landmarks\n",
     settings=RangeOfMotion,
     files=RangeOfMotionFiles,
     checks=(check_range_of_motion,),

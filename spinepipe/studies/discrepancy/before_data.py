@@ -1,4 +1,4 @@
-"""What `spinepipe plan STUDY` says: an answer of a few lines, and all of it as a table."""
+"""What `spinepipe new study --design` says: an answer of a few lines, and all of it as a table."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
@@ -18,7 +18,7 @@ from spinepipe.studies.discrepancy.words import general
 MOST_ROWS = 10
 
 
-def plan(
+def prospects(
     study: Discrepancy, cohort: Cohort, root: Path, cycles: int, gaps: Sequence[float], to: Path
 ) -> Iterator[str]:
     """Lines for the terminal; the table is written to ``to``, .csv or .parquet.

@@ -44,7 +44,8 @@ def test_what_is_sure_is_named_and_what_is_hopeless_is_not(
 ) -> None:
     """Motion of another simulator: the same geometry and loads, one effect hidden at a time."""
     table = tmp_path / "plan.csv"
-    assert main(["--root", str(project), "plan", "planned", "--to", str(table)]) == 0
+    words = ["new", "study", "planned", "--design", "--to", str(table)]
+    assert main(["--root", str(project), *words]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("Of 4 effects that make a misfit of 0.5 SD of one reading, ")
     assert said[1].startswith("Most is gained by: ")
@@ -76,7 +77,8 @@ def test_where_nobody_says_how_exact_readings_are_nothing_is_promised(
     kept = [one for one in told.splitlines(keepends=True) if not one.startswith(sizes)]
     cohort.write_text("".join(kept))
     try:
-        assert main(["--root", str(project), "plan", "planned", "--to", str(tmp_path / "a.csv")])
+        words = ["new", "study", "planned", "--design", "--to", str(tmp_path / "a.csv")]
+        assert main(["--root", str(project), *words]) == 1
     finally:
         cohort.write_text(told)
     assert "measurement_sd or accuracy" in capsys.readouterr().err

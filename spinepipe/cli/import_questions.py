@@ -1,0 +1,254 @@
+"""What `spinepipe import` shows of data files and asks about them, as the text of import.yaml."""
+
+import os
+import re
+import sys
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from spinepipe.cohort.cohort import joint_names
+from spinepipe.documents.yaml_text import YamlDocument, yaml_of_text
+from spinepipe.problems import InputError, InputProblem, one_of
+from spinepipe.report.words import count, listed
+from spinepipe.studies.discrepancy.search.noise import USUAL_ACCURACY
+from spinepipe.testing_machine.channels import DIRECTIONS
+from spinepipe.testing_machine.folder import read
+from spinepipe.testing_machine.sniff import seen, unit_of
+from spinepipe.testing_machine.suggest import ANSWERS, Suggestion, likely_unit, suggested
+
+SETTINGS = "import.yaml"
+
+NO_NAMES = ("raw", "data", "csv", "files", "export")
+"""Names of folders that say nothing about a cohort."""
+
+UNITS_OF = {
+    "time": "s, ms, min",
+    "moment": "N m, N mm, N cm",
+    "angle": "deg, rad",
+    "force": "N, kN",
+}
+
+TURNS = tuple(word for word, way in DIRECTIONS.items() if way.turns)
+
+
+class Questions:
+    """Asks, or takes every suggestion."""
+
+    def __init__(self, yes: bool) -> None:
+        self.yes = yes
+
+    def ask(self, text: str, suggestion: Any, **how: Any) -> Any:
+        """The answer; the suggestion where it is just accepted."""
+        return suggestion if self.yes else typer.prompt(text, default=suggestion, **how)
+
+
+def described(
+    files: Sequence[Path],
+    ask: Questions,
+    pattern: str | None,
+    cohort: str | None,
+    vertebrae: str | None,
+    accuracy_deg: float | None,
+) -> tuple[Path, str]:
+    """The folder of the files and the text of the settings that describe them.
+
+    Parameters
+    ----------
+    pattern, cohort, vertebrae, accuracy_deg : answers given beforehand; None: asked.
+
+    Raises
+    ------
+    InputError
+        Where a file holds no table, or, without questions, something cannot be told.
+    """
+    folder = Path(os.path.commonpath([one.absolute().parent for one in files]))
+    names = [one.absolute().relative_to(folder).as_posix() for one in files]
+    looked = [seen(path, name) for path, name in zip(files, names, strict=True)]
+    try:
+        suggestion = suggested(folder, looked, pattern)
+    except InputError:
+        if pattern is not None or ask.yes:
+            raise
+        print(f"Where do specimen and test stand in names such as {names[0]}?")
+        pattern = typer.prompt("Pattern, such as {specimen}_{test}.csv")
+        suggestion = suggested(folder, looked, pattern)
+    _print_files(suggestion)
+    _columns(suggestion, ask)
+    _directions(suggestion, ask)
+    if vertebrae is None:
+        shown = " ".join(suggestion.vertebrae)
+        vertebrae = ask.ask("Which vertebrae, from the lowest, which is held?", shown)
+    suggestion.vertebrae = tuple(re.split(r"[\s,]+", vertebrae.strip()))
+    _joints(suggestion, ask)
+    own = next(
+        (n for n in (folder.name, folder.parent.name) if n.lower() not in NO_NAMES), "my_lab"
+    )
+    cohort = cohort or ask.ask(
+        "Name of the cohort", re.sub("[^a-z0-9]+", "_", own.lower()).strip("_")
+    )
+    chain = suggestion.vertebrae
+    what = f"{count(len(suggestion.specimens), 'specimen')} {chain[-1]}-{chain[0]}"
+    header = {
+        "cohort": cohort,
+        "title": f"{what}, {count(len(suggestion.tests), 'test')}: {listed(suggestion.tests)}",
+        "source": ask.ask("Source: who measured, when, how; licence", "not told"),
+        "vertebrae": list(chain),
+    }
+    if suggestion.load_point_mm is not None:
+        header["load_point_mm"] = list(suggestion.load_point_mm)
+    kept, _ = _cycles(folder, suggestion.settings(header, 0))
+    first = int(kept > 2)
+    if kept > 2 and not ask.yes:
+        text = f"Cycles: {kept} in each file. Leave out the first as preconditioning?"
+        first = int(typer.confirm(text, default=True))
+    if accuracy_deg is None:
+        _, repeats = _cycles(folder, suggestion.settings(header, first))
+        usual = round(float(np.degrees(USUAL_ACCURACY[3])), 6)
+        told = (
+            ""
+            if np.isnan(repeats)
+            else f" The cycles repeat within {repeats:.2g}, which is no accuracy."
+        )
+        text = f"Accuracy of one angle, deg?{told} Rigs are seldom better than {usual:g}"
+        accuracy_deg = ask.ask(text, usual, type=float)
+    header["accuracy"] = {"rotation_deg": accuracy_deg}
+    return folder, suggestion.settings(header, first)
+
+
+def document_of(text: str) -> YamlDocument:
+    """Settings that no file holds yet.
+
+    Raises
+    ------
+    InputError
+        Where they are no YAML.
+    """
+    document, problems = yaml_of_text(text, SETTINGS)
+    if document is None:
+        raise InputError(problems)
+    return document
+
+
+def _cycles(folder: Path, text: str) -> tuple[int, float]:
+    """The fewest cycles of a file, and SD of a rotation between cycles, deg; 0 if not readable."""
+    try:
+        tests = read(folder, document_of(text))
+    except InputError:  # said when it is imported
+        return 0, float("nan")
+    kept = min(len(cut.kept) for test in tests.tests for cut in test.cuts)
+    return kept, float("nan") if tests.rotation is None else tests.rotation.cycles
+
+
+def _print_files(of: Suggestion) -> None:
+    form = of.files[0].form
+    alike = "" if all(one.form == form for one in of.files) else " (the first; others differ)"
+    first = form.get("first_line") or int(str(form.get("names_line", 1))) + 1
+    names = (
+        f"names in line {form.get('names_line', 1)}" if form.get("names_line", 1) else "no names"
+    )
+    how = f"separated by {form.get('delimiter', 'comma')}s, decimal {form.get('decimal', 'point')}"
+    if of.files[0].name.endswith(".xlsx"):
+        how = "workbooks"
+    names += f", numbers from line {first}{alike}"
+    of_what = (("specimen", of.specimens), ("test", of.tests))
+    there = [f"{count(len(every), what)} ({listed(every)})" for what, every in of_what]
+    print(f"{count(len(of.files), 'file')}, {', '.join(there)}; {how}, {names}.")
+
+
+def _columns(of: Suggestion, ask: Questions) -> None:
+    """Show what columns are taken as, until nothing is to be changed."""
+    while True:
+        columns = of.columns()
+        _print_columns(of)
+        text = "Right? Enter, or the number of a column to change"
+        answer = ask.ask(text, "", show_default=False).strip()
+        if not answer:
+            return
+        if not answer.isdecimal() or not 1 <= int(answer) <= len(columns):
+            print(f"A number from 1 to {len(columns)}.")
+            continue
+        key = list(columns)[int(answer) - 1]
+        what = ""
+        while what not in ANSWERS:
+            what = ask.ask(f"{key} is ({', '.join(ANSWERS)})", of.taken[key][0])
+        unit = ""
+        if what != "no":
+            size = max(float(np.nanmax(np.abs(one.values))) for one in columns[key])
+            clock = columns[key][0].clock
+            said = next((one.unit for one in columns[key] if one.unit), "")
+            said = said if said in UNITS_OF[what] else ""
+            unit = said or likely_unit(what, size, clock)
+            given = ask.ask(f"Unit ({UNITS_OF[what]})", unit) if not clock else unit
+            unit = unit_of(given) or given
+        of.taken[key] = what, unit
+        if what == "force":
+            of.force_towards[key] = ask.ask("A positive number pushes to", "inferior")
+            point = ask.ask("Where it acts, mm anterior, superior, right of the joint", "0 0 0")
+            of.load_point_mm = tuple(float(one) for one in point.split())
+
+
+def _print_columns(of: Suggestion) -> None:
+    ways: dict[Any, dict[str, list[str]]] = defaultdict(lambda: defaultdict(list))
+    for file in of.files:
+        _, loads, motion = of.channels(file)
+        for one in (*loads, *motion):
+            there = ways[one["column"]][of.of[file.name][1]]
+            there += [one["positive"]] if one["positive"] not in there else []
+    table = Table(box=None, pad_edge=False)
+    for name in ("", "column", "values", "taken as", "a positive number turns towards"):
+        table.add_column(name)
+    for number, (key, there) in enumerate(of.columns().items(), start=1):
+        what, unit = of.taken[key]
+        low = min(float(np.nanmin(one.values)) for one in there)
+        high = max(float(np.nanmax(one.values)) for one in there)
+        some = "" if len(there) == len(of.files) else f" (in {count(len(there), 'file')})"
+        words = ", ".join(f"{test} {' or '.join(way)}" for test, way in ways[key].items())
+        if what == "no" and unit == "N":
+            mean = np.nanmean(np.concatenate([one.values for one in there]))
+            words = f"(mean {mean:.3g} N: a preload?)"
+        taken = "not used" if what == "no" else f"{what}, {unit}"
+        cells = (str(number), f"{key}{some}", f"{low:.4g} to {high:.4g}", taken, words)
+        table.add_row(*map(Text, cells))
+    Console(file=sys.stdout, width=110, highlight=False).print(table)
+
+
+def _directions(of: Suggestion, ask: Questions) -> None:
+    """Ask where moments turn, and refuse what lacks a moment, an angle or a direction."""
+    for test in of.tests:
+        text = f"A positive moment in {test} turns the upper vertebra towards"
+        way = of.towards.get(test, "")
+        while not ask.yes and (way := ask.ask(text, way or None)) not in TURNS:
+            print(f"Allowed: {', '.join(TURNS)}.")
+        if way not in TURNS:
+            remedy = (
+                "name the test FE, LB or AR in the files' names or by --pattern, or leave out --yes"
+            )
+            found = "a test whose name does not tell its direction"
+            raise InputError([InputProblem(test, None, None, found, one_of(TURNS), remedy)])
+        of.towards[test] = way
+    for what in ("moment", "angle"):
+        lack = [f.name for f in of.files if not any(of.taken[c.key][0] == what for c in f.columns)]
+        if lack:
+            remedy = f"say which column is the {what}; without --yes it is asked"
+            told = InputProblem(
+                lack[0], None, None, f"no {what}", f"one {what}", remedy, len(lack) - 1
+            )
+            raise InputError([told])
+
+
+def _joints(of: Suggestion, ask: Questions) -> None:
+    """Ask which joint an angle moves, where there are several and its name tells none."""
+    joints = joint_names(of.vertebrae)
+    for key, (what, _) in of.taken.items():
+        if what == "angle" and len(joints) > 1 and of.joints.get(key) not in joints:
+            of.joints[key] = ask.ask(
+                f"{key} is the motion of which joint ({', '.join(joints)})", joints[0]
+            )
