@@ -7,7 +7,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from spinepipe.api.result import Result, with_units
+from spinepipe.api import plot
+from spinepipe.api.result import Result, concluded, lights, with_units
 from spinepipe.api.study import Say, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.progress import silent
@@ -41,12 +42,18 @@ class Sensitivity(Result):
     Attributes
     ----------
     table : a row per specimen, output, factor and index, with its interval; see docs/results.md.
-    quality : runs by their status.
+    runs : how many there are by their status.
     samples : value of each factor in each sample. responses : motion and joint loads of each.
     """
 
+    runs: pd.DataFrame
     samples: pd.DataFrame
     responses: pd.DataFrame
+
+    def plot(self, ax: Any = None) -> Any:
+        """Indices of each factor, see `spinepipe.plot.indices`."""
+        known = self.table["index"].unique()
+        return plot.indices(self, index=next(one for one in _TOTAL if one in known), ax=ax)
 
     @property
     def indices(self) -> pd.DataFrame:
@@ -121,7 +128,8 @@ def sensitivity(
     drawn = pd.DataFrame(shown, columns=list(study.factor_names))
     drawn.attrs["units"] = dict(zip(study.factor_names, study.units, strict=True))
     by_status = answered.groupby("status").agg(rows=("sample", "size")).reset_index()
-    return Sensitivity(_headline(table), table, by_status, drawn, answered)
+    said = concluded(study, cohort, {INDICES.name: table, RESPONSES.name: answered})
+    return Sensitivity(_headline(table), table, lights(said), said, by_status, drawn, answered)
 
 
 def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: Any) -> Any:

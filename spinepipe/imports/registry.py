@@ -28,9 +28,13 @@ def read(path: Path) -> ImportedCohort:
     InputError
         With every problem of the settings, else of the files.
     """
-    document = read_settings(path)
+    return of_document(path.parent, read_settings(path))
+
+
+def of_document(folder: Path, document: YamlDocument) -> ImportedCohort:
+    """As `read`, of settings that may be in no file yet, about files in a folder."""
     module = import_module(KINDS[_kind(document)])
-    imported: ImportedCohort = module.imported(path.parent, document)
+    imported: ImportedCohort = module.imported(folder, document)
     return imported
 
 

@@ -1,0 +1,42 @@
+"""`spinepipe cite STUDY`: methods to copy, references, versions."""
+
+from typing import Annotated
+
+import typer
+
+from spinepipe.api.results import Results
+from spinepipe.citing.cite import bibtex, csl_json, references, versions
+from spinepipe.cli.find import known_study
+from spinepipe.studies import read as studies
+from spinepipe.studies.exports import required_result
+from spinepipe.studies.registry import files_of
+
+
+def command(
+    context: typer.Context,
+    study: Annotated[str, typer.Argument(help="name of a study that was computed")],
+    paragraph: Annotated[bool, typer.Option("--methods", help="the paragraph alone")] = False,
+    bib: Annotated[bool, typer.Option("--bibtex", help="references as BibTeX alone")] = False,
+    csl: Annotated[bool, typer.Option("--csl", help="references as CSL-JSON alone")] = False,
+    run: Annotated[bool, typer.Option("--versions", help="versions and digests alone")] = False,
+) -> int:
+    """Print a paragraph of methods, references and versions of a study, to be copied."""
+    root = context.obj
+    read, cohort = studies.check(root, known_study(study, root), starting=False)
+    page = root / files_of(read, cohort).page()
+    results = Results(required_result(page, "choose another study").parent)
+    text = results.cite()
+    entries = references(text)
+    everything = not (paragraph or bib or csl or run)
+    if paragraph or everything:
+        print(f"{text}\n\nSettings: config/studies/{study}.yaml, seed {read.seed}.")
+        print(f"Data: {' '.join(cohort.source.split())}")
+    if bib or everything:
+        print(bibtex(entries))
+    if csl:
+        print(csl_json(entries))
+    if run or everything:
+        print("".join(f"{k}: {v}\n" for k, v in versions(results.provenance).items()), end="")
+    if everything:
+        print(f"Next: spinepipe cite {study} --csl for Zotero, or spinepipe archive {study}.")
+    return 0
