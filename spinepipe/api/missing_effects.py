@@ -9,7 +9,7 @@ from typing import Any, Literal
 import pandas as pd
 
 from spinepipe.api import plot
-from spinepipe.api.result import Result, concluded, frame, lights
+from spinepipe.api.result import Result, concluded, frame
 from spinepipe.api.study import Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import ModelFile, read_model
@@ -28,7 +28,6 @@ class MissingEffects(Result):
     Attributes
     ----------
     table : the effects that are missing for certain: ``name``, ``log_evidence``, coordinates.
-    headline : the answer as the page of a study has it.
     depends_on : noise, threshold, and residuals with and without the effects.
     search : how the search ended and what was not tried, in a sentence.
     verdict : ``NAMED``, ``PART``, ``SET``, ``NULL`` or ``UNKNOWN``; ``why`` in a sentence.
@@ -133,9 +132,7 @@ def _result(study: Discrepancy, cohort: Cohort, found: DiscrepancyResults) -> Mi
     # of the places where a page has it, the one that names what was not tried
     of_search = [one.text for one in conclusions if (one.place, one.rule) == ("light", "ended")]
     return MissingEffects(
-        headline=next(one.text for one in conclusions if one.place == "answer"),
         table=pd.DataFrame(named, columns=None if named else ["name", "log_evidence", "spread"]),
-        quality=lights(conclusions),
         conclusions=conclusions,
         depends_on=pd.DataFrame(depends_on, columns=["quantity", "value", "unit"]),
         search="".join(of_search),

@@ -9,8 +9,10 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import matplotlib.pyplot as plt
 import pandas as pd
 
+import spinepipe
 from spinepipe.citing.cite import methods
 from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
@@ -59,17 +61,28 @@ def concluded(
     return told(rules(study, cohort, results), sentences_of(package))
 
 
-def lights(conclusions: Sequence[Told]) -> pd.DataFrame:
-    """Those of the page: ``light`` (ok, check, stop), ``check``, ``finding``; the worst first."""
-    return quality(pd.DataFrame(rows_of(conclusions)))
-
-
 class Shown:
-    """What notebooks and pages show of an answer that has headline, table and quality."""
+    """What an answer shows that has a table and the conclusions of a page.
 
-    headline: str
+    Attributes
+    ----------
+    table : its numbers, one row each; units in ``table.attrs["units"]``.
+    conclusions : what the page of such a study says.
+    """
+
     table: pd.DataFrame
-    quality: pd.DataFrame
+    conclusions: Sequence[Told]
+    made_by = spinepipe.__version__
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        return next(one.text for one in self.conclusions if one.place == "answer")
+
+    @property
+    def quality(self) -> pd.DataFrame:
+        """How far to trust it: ``light`` (ok, check, stop), ``check``, ``finding``; worst first."""
+        return quality(pd.DataFrame(rows_of(self.conclusions)))
 
     def plot(self, ax: Any = None) -> Any:
         """The key figure, as `matplotlib.axes.Axes`: ``ax``, or new ones."""
@@ -77,7 +90,7 @@ class Shown:
 
     def cite(self) -> str:
         """What was done, and by what, to be copied."""
-        raise NotImplementedError
+        return methods(self.conclusions, self.made_by)
 
     def report(self, path: str | Path) -> None:
         """Write headline, figure, numbers and quality as one HTML file."""
@@ -94,8 +107,6 @@ class Shown:
 
     def _figure(self) -> str:
         """The key figure as part of a page."""
-        import matplotlib.pyplot as plt  # takes half a second
-
         figure, ax = plt.subplots(figsize=(6, 3.5), layout="constrained")
         self.plot(ax)
         file = BytesIO()
@@ -105,30 +116,15 @@ class Shown:
         return f'<img alt="{escape(self.headline)}" src="data:image/png;base64,{data}">'
 
     def _repr_html_(self) -> str:
-        counts = self.quality["light"].value_counts().to_dict() if len(self.quality) else {}
-        trust = ", ".join(f"{n} {light}" for light, n in counts.items())
+        counts = self.quality["light"].value_counts(sort=False).items()
+        trust = ", ".join(f"{n} {light}" for light, n in counts)
         rows = self.table.head(SHOWN_ROWS).to_html(index=False, na_rep="", border=0)
         return f"<p><b>{escape(self.headline)}</b></p><p>Quality: {trust}</p>{self._figure()}{rows}"
 
 
 @dataclass(frozen=True, eq=False)
 class Result(Shown):
-    """An answer.
+    """An answer that was computed here; see `Shown`."""
 
-    Attributes
-    ----------
-    headline : the answer in one sentence.
-    table : its numbers, one row each; units in ``table.attrs["units"]``.
-    quality : how far they can be trusted, as the page of a study says: ``light`` (ok, check, stop),
-        ``check``, ``finding``; the worst first.
-    conclusions : all that the page would say.
-    """
-
-    headline: str
     table: pd.DataFrame
-    quality: pd.DataFrame
     conclusions: Sequence[Told]
-
-    def cite(self) -> str:
-        """What was done, and by what, to be copied."""
-        return methods(self.conclusions)

@@ -12,8 +12,7 @@ import pandas as pd
 import xarray as xr
 
 from spinepipe.api.arrays import arrays
-from spinepipe.api.result import Shown, lights, with_units
-from spinepipe.citing.cite import methods
+from spinepipe.api.result import Shown, with_units
 from spinepipe.jobs.expected import Expected
 from spinepipe.marks import mark_in
 from spinepipe.report.conclusions import Told, read_back
@@ -67,12 +66,7 @@ class Results(Shown, Mapping[str, pd.DataFrame]):
     @cached_property
     def kind(self) -> Kind:
         """The declaration of the kind of study."""
-        return kind_of(self.kind_name)
-
-    @property
-    def kind_name(self) -> str:
-        """Of the study."""
-        return self.provenance["kind"]
+        return kind_of(self.provenance["kind"])
 
     @cached_property
     def provenance(self) -> Mapping[str, str]:
@@ -96,26 +90,16 @@ class Results(Shown, Mapping[str, pd.DataFrame]):
         """
         return read_back(read_frame(self.path / f"{CONCLUSIONS.name}.parquet"))
 
-    @property
-    def headline(self) -> str:  # type: ignore[override]
-        """The answer on the page."""
-        return next(one.text for one in self.conclusions if one.place == "answer")
-
-    @property
-    def table(self) -> pd.DataFrame:  # type: ignore[override]
+    @cached_property
+    def table(self) -> pd.DataFrame:
         """The first of the tidy tables: stiffness, loads, indices or angles."""
         table, rows = next(iter(self.tidy.values()))
         return with_units(table, rows)
 
     @property
-    def quality(self) -> pd.DataFrame:  # type: ignore[override]
-        """Lights of the page: ``light``, ``check``, ``finding``; the worst first."""
-        return lights(self.conclusions)
-
-    @property
     def tidy(self) -> dict[str, tuple[Table, pd.DataFrame]]:
         """Tidy tables by name, each with what its columns are."""
-        return tidied(self.kind_name, self)
+        return tidied(self.provenance["kind"], self)
 
     def xarray(self, name: str) -> xr.Dataset:
         """A table as arrays over its keys; a unit that hangs on the row is told as in the table."""
@@ -136,9 +120,10 @@ class Results(Shown, Mapping[str, pd.DataFrame]):
         """Copy the page of the study; links to tables lead nowhere from there."""
         shutil.copyfile(self.path / "report.html", path)
 
-    def cite(self) -> str:
-        """The methods of the page, to be copied."""
-        return methods(self.conclusions, self.provenance["version_spinepipe"])
+    @property
+    def made_by(self) -> str:  # type: ignore[override]
+        """The version of spinepipe that computed it."""
+        return self.provenance["version_spinepipe"]
 
     @property
     def stale(self) -> list[str]:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.api import plot
-from spinepipe.api.result import Result, concluded, lights, with_units
+from spinepipe.api.result import Result, concluded, with_units
 from spinepipe.api.study import Say, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.progress import silent
@@ -31,8 +31,6 @@ MOTION_AND_LOAD = ("motion", "joint_load")
 
 _TOTAL = ("ST", "mu_star", "S1", "S1_RBD")
 """What ranks factors, of the indices that a method has."""
-
-_PLACE = ["specimen", "output", "test", "step", "joint", "coordinate"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +127,7 @@ def sensitivity(
     drawn.attrs["units"] = dict(zip(study.factor_names, study.units, strict=True))
     by_status = answered.groupby("status").agg(rows=("sample", "size")).reset_index()
     said = concluded(study, cohort, {INDICES.name: table, RESPONSES.name: answered})
-    return Sensitivity(_headline(table), table, lights(said), said, by_status, drawn, answered)
+    return Sensitivity(table, said, by_status, drawn, answered)
 
 
 def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: Any) -> Any:
@@ -147,15 +145,3 @@ def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: 
         for name, cells in responses(batch, cohort.joint_names)[0].items():
             columns.setdefault(name, []).extend(cells)
     return to_arrow(RESPONSES, columns, specimen=specimen)
-
-
-def _headline(table: pd.DataFrame) -> str:
-    """The factor with the largest total index in most outputs."""
-    name = next((one for one in _TOTAL if one in set(table["index"])), "")
-    known = table[(table["index"] == name) & table["estimate"].notna()]
-    if known.empty:
-        return "No index could be computed."
-    most = known.loc[known.groupby(_PLACE)["estimate"].idxmax()]
-    first = most["factor"].mode().iloc[0]
-    share = int((most["factor"] == first).sum())
-    return f"{first} moves {share} of {len(most)} outputs most (largest {name})."

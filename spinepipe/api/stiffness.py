@@ -10,13 +10,13 @@ import pandas as pd
 import xarray as xr
 
 from spinepipe.api import plot
-from spinepipe.api.result import Result, concluded, frame, lights
+from spinepipe.api.result import Result, concluded, frame
 from spinepipe.api.simulation import simulate
 from spinepipe.api.study import NAME, Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
 from spinepipe.progress import silent
-from spinepipe.status import NOT_FITTED, USABLE
+from spinepipe.status import USABLE
 from spinepipe.studies.base_model import BUSHING
 from spinepipe.studies.cohort_stiffness.fit import fitted
 from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
@@ -171,9 +171,7 @@ def calibrate(
     # neutral zones are of a run alone
     said = [one for one in concluded(study, cohort, every) if one.verdict != "neutral_zone"]
     return Stiffness(
-        headline=_headline(own),
         table=own,
-        quality=lights(said),
         conclusions=said,
         fits=fits[fits["fitted_to"] == label].reset_index(drop=True),
         stiffness=every["stiffness"],
@@ -260,10 +258,3 @@ def _model(
     )
     others = () if file is None else (one for one in file.effects if one.effect != BUSHING)
     return ModelFile(model=f"{NAME}_{name}", cohort=cohort.name, effects=(bushing, *others))
-
-
-def _headline(own: pd.DataFrame) -> str:
-    """How many stiffnesses are identifiable, and of how many specimens."""
-    known, every = int(own["identifiable"].eq(True).sum()), int((own["status"] != NOT_FITTED).sum())
-    specimens = own["specimen"].nunique()
-    return f"{known} of {every} stiffnesses of {specimens} specimens are identifiable."

@@ -1,20 +1,18 @@
 """What a paper says of a study: the methods of its page, its references, versions."""
 
+import csv
 import json
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 import spinepipe
 from spinepipe.report.conclusions import Told
 
-_FIELDS = {"title": "title", "container-title": "journal", "volume": "volume", "page": "pages"}
-"""BibTeX's names of fields of CSL."""
+_CSL = {"id": "id", "title": "title", "volume": "volume", "pages": "page", "doi": "DOI"}
+_CSL |= {"journal": "container-title"}
+_NOT_TOLD = ("id", "keyword")
 
 
 def methods(conclusions: Iterable[Told], made_by: str = spinepipe.__version__) -> str:
@@ -23,53 +21,41 @@ def methods(conclusions: Iterable[Told], made_by: str = spinepipe.__version__) -
     return " ".join([*said, f"Computed with spinepipe {made_by}."])
 
 
-def references(paragraph: str) -> list[dict[str, Any]]:
-    """Entries of CSL data that a methods paragraph calls for."""
-    return [
-        {**one, "issued": {"date-parts": [[one["issued"]]]}}
-        for one in _entries()
-        if any(word == "*" or word in paragraph for word in one["keyword"].split("|"))
-    ]
+def references(paragraph: str) -> list[dict[str, str]]:
+    """Articles that a methods paragraph calls for: it has their keyword, or they have none."""
+    with files(__package__).joinpath("references.csv").open(encoding="utf-8") as text:
+        return [one for one in csv.DictReader(text) if one["keyword"].strip("*") in paragraph]
 
 
-def csl_json(entries: Sequence[Mapping[str, Any]]) -> str:
-    """Entries as CSL-JSON, which Zotero, Pandoc and others read."""
-    plain = [{key: value for key, value in one.items() if key != "keyword"} for one in entries]
-    return json.dumps(plain, indent=1, ensure_ascii=False)
-
-
-def bibtex(entries: Sequence[Mapping[str, Any]]) -> str:
-    """Entries as BibTeX."""
+def csl_json(entries: Sequence[Mapping[str, str]]) -> str:
+    """References as CSL-JSON, which Zotero, Pandoc and others read."""
     told = []
     for one in entries:
-        authors = " and ".join(f"{name['family']}, {name['given']}" for name in one["author"])
-        fields = {"author": authors, "year": one["issued"]["date-parts"][0][0]}
-        fields |= {_FIELDS[key]: one[key].replace("&", r"\&") for key in _FIELDS if key in one}
-        fields |= {"doi": one["DOI"]} if "DOI" in one else {}
-        lines = "".join(f"  {key} = {{{value}}},\n" for key, value in fields.items())
+        names = [name.split(", ") for name in one["author"].split("; ")]
+        fields = {theirs: one[ours] for ours, theirs in _CSL.items() if one[ours]}
+        authors = [{"family": family, "given": given} for family, given in names]
+        issued = {"date-parts": [[int(one["year"])]]}
+        told.append({**fields, "type": "article-journal", "author": authors, "issued": issued})
+    return json.dumps(told, indent=1, ensure_ascii=False)
+
+
+def bibtex(entries: Sequence[Mapping[str, str]]) -> str:
+    """References as BibTeX."""
+    told = []
+    for one in entries:
+        shown = {key: cell for key, cell in one.items() if cell and key not in _NOT_TOLD}
+        shown["author"] = shown["author"].replace("; ", " and ")
+        lines = "".join(f"  {key} = {{{cell}}},\n" for key, cell in shown.items())
         told.append(f"@article{{{one['id']},\n{lines}}}\n")
     return "\n".join(told)
 
 
 def versions(metadata: Mapping[str, str]) -> dict[str, str]:
-    """What made a table, as its file says; of now the commit, where spinepipe runs from a clone.
-
-    Parameters
-    ----------
-    metadata : of a table, with versions of libraries and digests of code, settings and data.
-    """
+    """What made a table, as its file says; of now the commit, where spinepipe runs from a clone."""
     found = {key.removeprefix("version_"): value for key, value in metadata.items()}
     clone = Path(spinepipe.__file__).parents[1]
     if (clone / ".git").exists():
         asked = ["git", "-C", str(clone), "describe", "--always", "--dirty", "--exclude=*"]
         done = subprocess.run(asked, capture_output=True, text=True, check=False)
         found |= {"commit now": done.stdout.strip()} if done.returncode == 0 else {}
-    return found
-
-
-@cache
-def _entries() -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = yaml.safe_load(
-        files(__package__).joinpath("references.yaml").read_text("utf-8")
-    )
     return found

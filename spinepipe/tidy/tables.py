@@ -86,7 +86,7 @@ def quality(conclusions: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(ranked, columns=QUALITY.names)
 
 
-def write_tidy(results: Path, kind: str, metadata: Mapping[str, str]) -> list[Path]:
+def write_tidy(results: Path, kind: str) -> list[Path]:
     """Write ``tidy/`` in the folder of a study's results: CSV, Parquet, ``datapackage.json``.
 
     Returns
@@ -108,7 +108,7 @@ def write_tidy(results: Path, kind: str, metadata: Mapping[str, str]) -> list[Pa
     for name, (table, rows) in made.items():
         path = results / FOLDER / f"{name}.csv"
         columns = {head: rows[head] for head in table.names}
-        write(to_arrow(table, columns), path.with_suffix(".parquet"), metadata)
+        write(to_arrow(table, columns), path.with_suffix(".parquet"), {"kind": kind})
         with appearing(path) as temporary:
             rows.to_csv(temporary, index=False)
     told = [(table, f"{name}.csv") for name, (table, _) in made.items()]
