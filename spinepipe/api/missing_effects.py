@@ -21,7 +21,7 @@ from spinepipe.studies.discrepancy.tables import CANDIDATES, GAP, HELD_OUT, NEXT
 from spinepipe.studies.discrepancy.verdict import write_verdict
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MissingEffects(Result):
     """What a search for missing effects came to.
 

@@ -7,7 +7,7 @@ from html import escape
 from importlib import import_module
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib.pyplot as plt
 import pandas as pd
@@ -70,9 +70,14 @@ class Shown:
     conclusions : what the page of such a study says.
     """
 
-    table: pd.DataFrame
-    conclusions: Sequence[Told]
     made_by = spinepipe.__version__
+    if TYPE_CHECKING:  # a dataclass would take a property for the default of its field
+
+        @property
+        def table(self) -> pd.DataFrame: ...
+
+        @property
+        def conclusions(self) -> Sequence[Told]: ...
 
     @property
     def headline(self) -> str:
@@ -115,6 +120,9 @@ class Shown:
         data = base64.b64encode(file.getvalue()).decode()
         return f'<img alt="{escape(self.headline)}" src="data:image/png;base64,{data}">'
 
+    def __repr__(self) -> str:
+        return self.headline
+
     def _repr_html_(self) -> str:
         counts = self.quality["light"].value_counts(sort=False).items()
         trust = ", ".join(f"{n} {light}" for light, n in counts)
@@ -122,7 +130,7 @@ class Shown:
         return f"<p><b>{escape(self.headline)}</b></p><p>Quality: {trust}</p>{self._figure()}{rows}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result(Shown):
     """An answer that was computed here; see `Shown`."""
 

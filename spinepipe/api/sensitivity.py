@@ -33,7 +33,7 @@ _TOTAL = ("ST", "mu_star", "S1", "S1_RBD")
 """What ranks factors, of the indices that a method has."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity(Result):
     """Indices of all factors.
 

@@ -47,7 +47,7 @@ _TABLES = (STIFFNESS, PREDICTED_STIFFNESS, FITS, ERRORS)
 Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_pooled"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stiffness(Result):
     """Fitted stiffness.
 

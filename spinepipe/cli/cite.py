@@ -35,7 +35,7 @@ def command(
     entries = references(text)
     everything = not (paragraph or bib or csl or run)
     if paragraph or everything:
-        print(f"{text}\n\nSettings: config/studies/{study}.yaml, seed {read.seed}.")
+        print(f"{text}\n\nSettings: config/studies/{study}.yaml, seed {made['seed']}.")
         print(f"Data: {' '.join(cohort.source.split())}")
     if bib or everything:
         print(bibtex(entries))

@@ -107,7 +107,7 @@ def write_tidy(results: Path, kind: str) -> list[Path]:
     made = tidied(kind, found)
     for name, (table, rows) in made.items():
         path = results / FOLDER / f"{name}.csv"
-        columns = {head: rows[head] for head in table.names}
+        columns: dict[str, Any] = {head: rows[head] for head in table.names}
         write(to_arrow(table, columns), path.with_suffix(".parquet"), {"kind": kind})
         with appearing(path) as temporary:
             rows.to_csv(temporary, index=False)
