@@ -20,6 +20,7 @@ from benchmarks import (
     equilibria,
     films,
     identification,
+    imports,
     lost_fits,
     machine_texts,
     many_spines,
@@ -44,6 +45,7 @@ def main() -> None:
     parts: dict[str, Callable[[], None]] = {
         "foundation": foundation,
         "identification": identification_parts,
+        "imports": lambda: print(*imports.seconds(), sep="\n", flush=True),
         "lost_fits": lost_fits_parts,
         "whole_study": whole_study,
         "cohort": cohort_parts,

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from spinepipe.api import plot
     from spinepipe.api.cohorts import check, read_cohort
+    from spinepipe.api.machine import import_machine
     from spinepipe.api.missing_effects import find_missing_effects
     from spinepipe.api.results import compare, open_results
+    from spinepipe.api.running import run
     from spinepipe.api.sensitivity import sensitivity
     from spinepipe.api.simulation import simulate
     from spinepipe.api.stiffness import calibrate
@@ -24,9 +26,11 @@ __all__ = [
     "check",
     "compare",
     "find_missing_effects",
+    "import_machine",
     "open_results",
     "plot",
     "read_cohort",
+    "run",
     "sensitivity",
     "simulate",
 ]
@@ -37,8 +41,10 @@ _PLACES = {
     "check": "spinepipe.api.cohorts",
     "compare": "spinepipe.api.results",
     "find_missing_effects": "spinepipe.api.missing_effects",
+    "import_machine": "spinepipe.api.machine",
     "open_results": "spinepipe.api.results",
     "read_cohort": "spinepipe.api.cohorts",
+    "run": "spinepipe.api.running",
     "sensitivity": "spinepipe.api.sensitivity",
     "simulate": "spinepipe.api.simulation",
 }

@@ -1,5 +1,6 @@
 """Which physics a model of a cohort lacks."""
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -7,32 +8,27 @@ from typing import Any, Literal
 
 import pandas as pd
 
-from spinepipe.api.result import Result, frame
+from spinepipe.api import plot
+from spinepipe.api.result import Result, concluded, frame
 from spinepipe.api.study import Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import ModelFile, read_model
 from spinepipe.progress import Progress, silent
-from spinepipe.report.conclusions import sentences_of, told
-from spinepipe.studies.discrepancy.conclusions import answer
-from spinepipe.studies.discrepancy.job import DiscrepancyResults, searched
-from spinepipe.studies.discrepancy.lights import extent
-from spinepipe.studies.discrepancy.misfits import model_name
+from spinepipe.studies.discrepancy.job import TABLES, DiscrepancyResults, searched
 from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import at_once
-from spinepipe.studies.discrepancy.tables import CANDIDATES, GAP, HELD_OUT, NEXT_TESTS, WHERE
+from spinepipe.studies.discrepancy.tables import CANDIDATES, GAP, HELD_OUT, NEXT_TESTS
+from spinepipe.studies.discrepancy.verdict import write_verdict
 
-PACKAGE = "spinepipe.studies.discrepancy"
 
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MissingEffects(Result):
     """What a search for missing effects came to.
 
     Attributes
     ----------
     table : the effects that are missing for certain: ``name``, ``log_evidence``, coordinates.
-    headline : the answer as the page of a study has it.
-    quality : what the verdict depends on: noise, threshold, and residuals with and without.
+    depends_on : noise, threshold, and residuals with and without the effects.
     search : how the search ended and what was not tried, in a sentence.
     verdict : ``NAMED``, ``PART``, ``SET``, ``NULL`` or ``UNKNOWN``; ``why`` in a sentence.
     probabilities : that each effect is missing, something else is, nothing is; likeliest first.
@@ -44,6 +40,7 @@ class MissingEffects(Result):
     model : the base with its effects; it can be the ``base`` of `spinepipe.calibration`.
     """
 
+    depends_on: pd.DataFrame
     search: str
     verdict: str
     why: str
@@ -55,6 +52,10 @@ class MissingEffects(Result):
     misfit: pd.DataFrame
     left_out: pd.DataFrame
     model: ModelFile
+
+    def plot(self, ax: Any = None) -> Any:
+        """How probable each effect is, see `spinepipe.plot.effects`."""
+        return plot.effects(self, ax=ax)
 
     @property
     def effects(self) -> pd.DataFrame:
@@ -68,6 +69,7 @@ def find_missing_effects(
     base: Literal["per_specimen", "per_joint"] | ModelFile | Path = "per_specimen",
     effects: Sequence[str] | None = None,
     tests: Sequence[str] | None = None,
+    effort: Literal["quick", "standard", "full"] | None = None,
     settings: Mapping[str, Any] | None = None,
     say: Say = silent,
 ) -> MissingEffects:
@@ -79,6 +81,7 @@ def find_missing_effects(
     ----------
     base : linear bushings of one stiffness per specimen or per joint, or a model.
     effects : names that are tried; all by default, see docs/effects.md.
+    effort : how many fits the search may make; ``standard`` unless `settings` say otherwise.
     settings : any further keys of such a study, as in its file, such as
         ``{"measurement_sd": {"rotation_deg": 0.1, "translation_mm": 0.1}}``; they come before the
         others.
@@ -95,26 +98,28 @@ def find_missing_effects(
             "base": {"stiffness": words} if path is None else {"model": path},
             "effects": None if effects is None else list(effects),
             "tests": None if tests is None else list(tests),
+            "effort": effort,
             **(settings or {}),
         }
         study = study_of(Discrepancy, cohort, asked)
         file = None if path is None else read_model(path)
-    return _result(searched(study, cohort, file, at_once, Progress(say)), model_name(study))
+    return _result(study, cohort, searched(study, cohort, file, at_once, Progress(say)))
 
 
-def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
-    """The same in frames; ``model`` : what the base is called."""
+def _result(study: Discrepancy, cohort: Cohort, found: DiscrepancyResults) -> MissingEffects:
+    """The same in frames."""
     verdict = found.verdict
-    tables = {
-        one.name: frame(one, found.rows.get(one.name, ()))
-        for one in (CANDIDATES, GAP, HELD_OUT, NEXT_TESTS, WHERE)
-    }
+    tables = {one.name: frame(one, found.rows.get(one.name, ())) for one in TABLES}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "verdict.json"
+        write_verdict(verdict, path, "0" * 64)
+        conclusions = concluded(study, cohort, tables, {"verdict": str(path)})
     named = [
         {"name": one.name, "log_evidence": one.log_evidence, "spread": one.spread, **one.variant}
         for one in verdict.effects
     ]
     noise, rms = verdict.noise, verdict.rms_residual
-    quality = [
+    depends_on = [
         ("noise of a rotation", noise.rotation_sd_deg, "deg"),
         ("noise of a translation", noise.translation_sd_mm, "mm"),
         ("log evidence required", verdict.threshold.log_evidence, ""),
@@ -124,15 +129,13 @@ def _result(found: DiscrepancyResults, model: str) -> MissingEffects:
         ("residual (RMS) of left-out readings, with", rms.held_out_with_effects, rms.unit),
     ]
     ranked = sorted(verdict.probabilities.items(), key=lambda one: -one[1])
-    ended = answer(verdict, model, tables[WHERE.name], tables[GAP.name])
-    said, *of_search = told([ended, *extent(verdict)], sentences_of(PACKAGE))
     # of the places where a page has it, the one that names what was not tried
-    lights = [one.text for one in of_search if one.place == "light"]
+    of_search = [one.text for one in conclusions if (one.place, one.rule) == ("light", "ended")]
     return MissingEffects(
-        headline=said.text,
         table=pd.DataFrame(named, columns=None if named else ["name", "log_evidence", "spread"]),
-        quality=pd.DataFrame(quality, columns=["quantity", "value", "unit"]),
-        search="".join(lights),
+        conclusions=conclusions,
+        depends_on=pd.DataFrame(depends_on, columns=["quantity", "value", "unit"]),
+        search="".join(of_search),
         verdict=verdict.verdict.value,
         why=verdict.why,
         probabilities=pd.DataFrame(ranked, columns=["name", "probability"]),

@@ -1,21 +1,26 @@
 """Figures of answers, each drawn on one `matplotlib.axes.Axes`, a new one unless given."""
 
+from typing import TYPE_CHECKING
+
 import matplotlib.pyplot as plt
 import pandas as pd
+import xarray as xr
 from matplotlib.axes import Axes
 
-from spinepipe.api.missing_effects import MissingEffects
-from spinepipe.api.sensitivity import Sensitivity
-from spinepipe.api.stiffness import Stiffness
 from spinepipe.cohort import Cohort
 from spinepipe.units import COORDINATE_COLUMNS
+
+if TYPE_CHECKING:  # they draw themselves by this module
+    from spinepipe.api.missing_effects import MissingEffects
+    from spinepipe.api.sensitivity import Sensitivity
+    from spinepipe.api.stiffness import Stiffness
 
 
 def curves(
     cohort: Cohort,
     test: str,
     *,
-    predicted: pd.DataFrame | None = None,
+    predicted: xr.Dataset | pd.DataFrame | None = None,
     coordinate: str = "extension_deg",
     specimen: str | None = None,
     joint: str | None = None,
@@ -25,12 +30,14 @@ def curves(
 
     Parameters
     ----------
-    predicted : rows of `spinepipe.simulate`. coordinate : a column of ``motion.csv``.
+    predicted : of `spinepipe.simulate`, or rows of it. coordinate : a column of ``motion.csv``.
     specimen, joint : the first of the cohort by default.
     """
     if coordinate not in COORDINATE_COLUMNS:
         raise ValueError(f"coordinate is {coordinate!r}; allowed: {', '.join(COORDINATE_COLUMNS)}")
     ax = ax or plt.subplots()[1]
+    if isinstance(predicted, xr.Dataset):
+        predicted = predicted.to_dataframe().reset_index().dropna(subset=[coordinate])
     specimen, joint = specimen or cohort.specimen_names[0], joint or cohort.joint_names[0]
     for label, rows, style in (("measured", cohort.motion, "o"), ("predicted", predicted, "-")):
         if rows is None:
@@ -46,7 +53,7 @@ def curves(
     return ax
 
 
-def stiffness(fit: Stiffness, *, coordinate: str = "extension", ax: Axes | None = None) -> Axes:
+def stiffness(fit: "Stiffness", *, coordinate: str = "extension", ax: Axes | None = None) -> Axes:
     """Fitted stiffness of each joint against one coordinate, with its 95 % region."""
     ax = ax or plt.subplots()[1]
     rows = fit.table[fit.table["coordinate"] == coordinate]
@@ -61,7 +68,7 @@ def stiffness(fit: Stiffness, *, coordinate: str = "extension", ax: Axes | None 
     return ax
 
 
-def left_out(fit: Stiffness, *, ax: Axes | None = None) -> Axes:
+def left_out(fit: "Stiffness", *, ax: Axes | None = None) -> Axes:
     """Mean absolute error in the loaded coordinate on motion that no fit saw, test by test."""
     ax = ax or plt.subplots()[1]
     loaded = fit.left_out[fit.left_out["loaded"].astype(bool)]
@@ -71,7 +78,7 @@ def left_out(fit: Stiffness, *, ax: Axes | None = None) -> Axes:
     return ax
 
 
-def indices(asked: Sensitivity, *, index: str = "ST", ax: Axes | None = None) -> Axes:
+def indices(asked: "Sensitivity", *, index: str = "ST", ax: Axes | None = None) -> Axes:
     """An index of each factor over all outputs: every one as a dot."""
     ax = ax or plt.subplots()[1]
     rows = asked.table[asked.table["index"] == index]
@@ -80,7 +87,7 @@ def indices(asked: Sensitivity, *, index: str = "ST", ax: Axes | None = None) ->
     return ax
 
 
-def effects(found: MissingEffects, *, ax: Axes | None = None) -> Axes:
+def effects(found: "MissingEffects", *, ax: Axes | None = None) -> Axes:
     """How probable it is of each effect that it is missing."""
     ax = ax or plt.subplots()[1]
     rows = found.probabilities.iloc[::-1]

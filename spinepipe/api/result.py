@@ -1,20 +1,34 @@
-"""What every answer is: a sentence, tables with their units, and a page of both."""
+"""What every answer is: a sentence, tables with their units, a figure, and a page of all three."""
 
+import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from importlib import import_module
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import matplotlib.pyplot as plt
 import pandas as pd
 
 import spinepipe
+from spinepipe.citing.cite import methods
+from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
+from spinepipe.report.conclusions import Told, rows_of, sentences_of, told
+from spinepipe.report.page.study_page import ResultTables
 from spinepipe.schema import Table
-from spinepipe.tables import from_rows
+from spinepipe.studies.registry import PACKAGE
+from spinepipe.studies.study import Study
+from spinepipe.tables import StudyTables, from_rows
+from spinepipe.tidy.tables import quality
 
 MOST_ROWS = 200
 """Of a table on a page of `Result.report`; more are told by their number."""
+
+SHOWN_ROWS = 8
+"""Of a table in a notebook."""
 
 
 def frame(table: Table, rows: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
@@ -34,24 +48,58 @@ def with_units(table: Table, found: pd.DataFrame) -> pd.DataFrame:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
-    """An answer.
+def concluded(
+    study: Study,
+    cohort: Cohort,
+    frames: Mapping[str, pd.DataFrame],
+    files: Mapping[str, str] | None = None,
+) -> list[Told]:
+    """What the page of a study would conclude of these tables, in its words."""
+    package = f"{PACKAGE}.{study.kind}"
+    rules = import_module(f"{package}.conclusions").conclusions
+    results = ResultTables(StudyTables(frames, files))
+    return told(rules(study, cohort, results), sentences_of(package))
+
+
+class Shown:
+    """What an answer shows that has a table and the conclusions of a page.
 
     Attributes
     ----------
-    headline : the answer in one sentence.
     table : its numbers, one row each; units in ``table.attrs["units"]``.
-    quality : how far they can be trusted: what ended how.
+    conclusions : what the page of such a study says.
     """
 
-    headline: str
-    table: pd.DataFrame
-    quality: pd.DataFrame
+    made_by = spinepipe.__version__
+    if TYPE_CHECKING:  # a dataclass would take a property for the default of its field
+
+        @property
+        def table(self) -> pd.DataFrame: ...
+
+        @property
+        def conclusions(self) -> Sequence[Told]: ...
+
+    @property
+    def headline(self) -> str:
+        """The answer in one sentence."""
+        return next(one.text for one in self.conclusions if one.place == "answer")
+
+    @property
+    def quality(self) -> pd.DataFrame:
+        """How far to trust it: ``light`` (ok, check, stop), ``check``, ``finding``; worst first."""
+        return quality(pd.DataFrame(rows_of(self.conclusions)))
+
+    def plot(self, ax: Any = None) -> Any:
+        """The key figure, as `matplotlib.axes.Axes`: ``ax``, or new ones."""
+        raise NotImplementedError
+
+    def cite(self) -> str:
+        """What was done, and by what, to be copied."""
+        return methods(self.conclusions, self.made_by)
 
     def report(self, path: str | Path) -> None:
-        """Write headline, numbers and quality as one HTML file."""
-        parts = [f"<h1>{escape(self.headline)}</h1>"]
+        """Write headline, figure, numbers and quality as one HTML file."""
+        parts = [f"<h1>{escape(self.headline)}</h1>{self._figure()}"]
         for title, rows in (("Numbers", self.table), ("Quality", self.quality)):
             shown = rows.head(MOST_ROWS).to_html(index=False, na_rep="", border=0)
             more = len(rows) - MOST_ROWS
@@ -62,9 +110,29 @@ class Result:
         with appearing(path) as temporary:
             temporary.write_text(f"{head}<body>{''.join(parts)}</body></html>\n", "utf-8")
 
-    def cite(self) -> str:
-        """What to cite for this answer."""
-        return f"Computed with spinepipe {spinepipe.__version__}."
+    def _figure(self) -> str:
+        """The key figure as part of a page."""
+        figure, ax = plt.subplots(figsize=(6, 3.5), layout="constrained")
+        self.plot(ax)
+        file = BytesIO()
+        figure.savefig(file, format="png", dpi=80)
+        plt.close(figure)
+        data = base64.b64encode(file.getvalue()).decode()
+        return f'<img alt="{escape(self.headline)}" src="data:image/png;base64,{data}">'
+
+    def __repr__(self) -> str:
+        return self.headline
 
     def _repr_html_(self) -> str:
-        return f"<p><b>{escape(self.headline)}</b></p>{self.table.head(10).to_html(index=False)}"
+        counts = self.quality["light"].value_counts(sort=False).items()
+        trust = ", ".join(f"{n} {light}" for light, n in counts)
+        rows = self.table.head(SHOWN_ROWS).to_html(index=False, na_rep="", border=0)
+        return f"<p><b>{escape(self.headline)}</b></p><p>Quality: {trust}</p>{self._figure()}{rows}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Shown):
+    """An answer that was computed here; see `Shown`."""
+
+    table: pd.DataFrame
+    conclusions: Sequence[Told]

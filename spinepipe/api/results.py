@@ -1,24 +1,32 @@
 """Results of a study that a run wrote: its tables as data frames, and how two runs differ."""
 
+import shutil
 from collections.abc import Collection, Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import xarray as xr
 
-from spinepipe.api.result import with_units
+from spinepipe.api.arrays import arrays
+from spinepipe.api.result import Shown, with_units
 from spinepipe.jobs.expected import Expected
 from spinepipe.marks import mark_in
+from spinepipe.report.conclusions import Told, read_back
+from spinepipe.schema import Table
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import kind_of
 from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_frame, read_metadata
+from spinepipe.tidy.tables import tidied
 
 
-class Results(Mapping[str, pd.DataFrame]):
-    """The tables of a study by name, each read when it is first asked for.
+class Results(Shown, Mapping[str, pd.DataFrame]):
+    """The tables of a study by name, each read when it is first asked for, and what its page says.
 
     Attributes
     ----------
@@ -71,6 +79,52 @@ class Results(Mapping[str, pd.DataFrame]):
         told = [(name, len(self[name]), self.kind.table(name).about) for name in self]
         return pd.DataFrame(told, columns=["name", "rows", "what"])
 
+    @cached_property
+    def conclusions(self) -> list[Told]:
+        """What the page of the study says.
+
+        Raises
+        ------
+        OSError
+            Where it has no page yet.
+        """
+        return read_back(read_frame(self.path / f"{CONCLUSIONS.name}.parquet"))
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """The first of the tidy tables: stiffness, loads, indices or angles."""
+        table, rows = next(iter(self.tidy.values()))
+        return with_units(table, rows)
+
+    @property
+    def tidy(self) -> dict[str, tuple[Table, pd.DataFrame]]:
+        """Tidy tables by name, each with what its columns are."""
+        return tidied(self.provenance["kind"], self)
+
+    def xarray(self, name: str) -> xr.Dataset:
+        """A table as arrays over its keys; a unit that hangs on the row is told as in the table."""
+        rows, shape = self[name], self.kind.table(name)
+        return arrays(rows, shape.key, rows.attrs["units"])
+
+    def plot(self, ax: Any = None) -> Any:
+        """The key figure of the page, as a picture."""
+        ax = ax or plt.subplots(layout="constrained")[1]
+        folder = self.path / self.kind.files.subfolder / "figures"
+        drawn = (folder / f"{one.name}.png" for one in self.kind.figures)
+        if (path := next((one for one in drawn if one.is_file()), None)) is not None:
+            ax.imshow(plt.imread(path))
+        ax.axis("off")
+        return ax
+
+    def report(self, path: str | Path) -> None:
+        """Copy the page of the study; links to tables lead nowhere from there."""
+        shutil.copyfile(self.path / "report.html", path)
+
+    @property
+    def made_by(self) -> str:  # type: ignore[override]
+        """The version of spinepipe that computed it."""
+        return self.provenance["version_spinepipe"]
+
     @property
     def stale(self) -> list[str]:
         """Tables that settings, data or code of now would make anew; none where all are current.
@@ -83,9 +137,6 @@ class Results(Mapping[str, pd.DataFrame]):
         root, name = self.path.absolute().parents[1], self.provenance["study"]
         expected = Expected(str(root), *check(root, name, starting=False))
         return [n for n in self if mark_in(self.files[n]) != expected.of_result(n)]
-
-    def _repr_html_(self) -> str:
-        return str(self.tables.to_html(index=False))
 
 
 def open_results(path: str | Path) -> Results:

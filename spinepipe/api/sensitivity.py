@@ -7,7 +7,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from spinepipe.api.result import Result, with_units
+from spinepipe.api import plot
+from spinepipe.api.result import Result, concluded, with_units
 from spinepipe.api.study import Say, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.progress import silent
@@ -31,22 +32,26 @@ MOTION_AND_LOAD = ("motion", "joint_load")
 _TOTAL = ("ST", "mu_star", "S1", "S1_RBD")
 """What ranks factors, of the indices that a method has."""
 
-_PLACE = ["specimen", "output", "test", "step", "joint", "coordinate"]
 
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity(Result):
     """Indices of all factors.
 
     Attributes
     ----------
     table : a row per specimen, output, factor and index, with its interval; see docs/results.md.
-    quality : runs by their status.
+    runs : how many there are by their status.
     samples : value of each factor in each sample. responses : motion and joint loads of each.
     """
 
+    runs: pd.DataFrame
     samples: pd.DataFrame
     responses: pd.DataFrame
+
+    def plot(self, ax: Any = None) -> Any:
+        """Indices of each factor, see `spinepipe.plot.indices`."""
+        known = self.table["index"].unique()
+        return plot.indices(self, index=next(one for one in _TOTAL if one in known), ax=ax)
 
     @property
     def indices(self) -> pd.DataFrame:
@@ -121,7 +126,8 @@ def sensitivity(
     drawn = pd.DataFrame(shown, columns=list(study.factor_names))
     drawn.attrs["units"] = dict(zip(study.factor_names, study.units, strict=True))
     by_status = answered.groupby("status").agg(rows=("sample", "size")).reset_index()
-    return Sensitivity(_headline(table), table, by_status, drawn, answered)
+    said = concluded(study, cohort, {INDICES.name: table, RESPONSES.name: answered})
+    return Sensitivity(table, said, by_status, drawn, answered)
 
 
 def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: Any) -> Any:
@@ -139,15 +145,3 @@ def _responses(study: GlobalSensitivity, cohort: Cohort, specimen: str, values: 
         for name, cells in responses(batch, cohort.joint_names)[0].items():
             columns.setdefault(name, []).extend(cells)
     return to_arrow(RESPONSES, columns, specimen=specimen)
-
-
-def _headline(table: pd.DataFrame) -> str:
-    """The factor with the largest total index in most outputs."""
-    name = next((one for one in _TOTAL if one in set(table["index"])), "")
-    known = table[(table["index"] == name) & table["estimate"].notna()]
-    if known.empty:
-        return "No index could be computed."
-    most = known.loc[known.groupby(_PLACE)["estimate"].idxmax()]
-    first = most["factor"].mode().iloc[0]
-    share = int((most["factor"] == first).sum())
-    return f"{first} moves {share} of {len(most)} outputs most (largest {name})."

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
+from spinepipe.api.arrays import MOTION_KEYS, MOTION_UNITS, arrays
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.specimen import joint_frames, load_cases, spine_model
 from spinepipe.effects.contract import Array
@@ -14,7 +16,7 @@ from spinepipe.model.file import ModelFile, effects_for
 from spinepipe.status import Status
 from spinepipe.studies.cohort_stiffness.predict import motions
 from spinepipe.studies.parts import Damping
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATE_UNITS, COORDINATES, from_si
+from spinepipe.units import COORDINATE_COLUMNS, from_si
 
 
 def simulate(
@@ -23,7 +25,7 @@ def simulate(
     *,
     specimens: Sequence[str] | None = None,
     tests: Sequence[str] | None = None,
-) -> pd.DataFrame:
+) -> xr.Dataset:
     """Equilibria of a model under the loads of a cohort, as they would be measured.
 
     Parameters
@@ -34,10 +36,10 @@ def simulate(
 
     Returns
     -------
-    DataFrame
-        A row per specimen, test, cycle, step and joint: six coordinates of motion (mm and deg, from
+    Dataset
+        Over specimen, test, cycle, step and joint: six coordinates of motion (mm and deg, from
         step 0 where the cohort's are), ``status`` and ``message``. A cycle without an equilibrium
-        has its status and no numbers.
+        has its status and no numbers. ``.to_dataframe()`` gives rows.
 
     Examples
     --------
@@ -45,18 +47,17 @@ def simulate(
     >>> disc = sp.read_cohort("config/cohorts/l4l5_disc")
     >>> fit = sp.calibrate(disc, free=["extension"], tests=["extension"], leave_out=None)
     >>> motion = sp.simulate(fit.model, disc, specimens=disc.specimen_names[:1])
-    >>> motion["status"].unique().tolist()
-    ['converged']
+    >>> dict(motion.sizes)
+    {'specimen': 1, 'test': 4, 'cycle': 1, 'step': 5, 'joint': 1}
+    >>> motion["extension_deg"].attrs["units"], set(motion["status"].values.flat)
+    ('deg', {'converged'})
     """
     rows = [
         row
         for specimen in specimens or cohort.specimen_names
         for row in _rows(model, cohort, specimen, tests or cohort.tests)
     ]
-    found = pd.DataFrame(rows)
-    units = dict(zip(COORDINATE_COLUMNS, map(COORDINATE_UNITS.get, COORDINATES), strict=True))
-    found.attrs["units"] = units
-    return found
+    return arrays(pd.DataFrame(rows), MOTION_KEYS, MOTION_UNITS)
 
 
 def _rows(

@@ -7,14 +7,16 @@ from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
+import xarray as xr
 
-from spinepipe.api.result import Result, frame
+from spinepipe.api import plot
+from spinepipe.api.result import Result, concluded, frame
 from spinepipe.api.simulation import simulate
 from spinepipe.api.study import NAME, Say, model_path, study_of
 from spinepipe.cohort import Cohort
 from spinepipe.model.file import EffectEntry, ModelFile, Scope, Values, read_model
 from spinepipe.progress import silent
-from spinepipe.status import NOT_FITTED, USABLE
+from spinepipe.status import USABLE
 from spinepipe.studies.base_model import BUSHING
 from spinepipe.studies.cohort_stiffness.fit import fitted
 from spinepipe.studies.cohort_stiffness.left_out import predicted_by_others
@@ -45,7 +47,7 @@ _TABLES = (STIFFNESS, PREDICTED_STIFFNESS, FITS, ERRORS)
 Representation = Literal["per_specimen", "level_ratio", "per_joint", "partially_pooled"]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stiffness(Result):
     """Fitted stiffness.
 
@@ -53,20 +55,26 @@ class Stiffness(Result):
     ----------
     table : a row per specimen, joint and fitted coordinate: ``stiffness`` with ``low`` and ``high``
         (95 % region), ``identifiable``, ``at_bound``, ``status``. Fitted to all tests.
-    quality : a row per specimen and what it was fitted to: readings, cost, optima, status.
+    fits : a row per specimen: readings, cost, optima, status.
     stiffness, predicted_stiffness, errors : all fits, what the others predict of each specimen, and
         errors of both, as the tables of the same names of a run.
     model : the fitted model, of the specimens that have a fit.
     """
 
+    fits: pd.DataFrame
     stiffness: pd.DataFrame
     predicted_stiffness: pd.DataFrame
     errors: pd.DataFrame
     model: ModelFile
     cohort: Cohort
 
+    def plot(self, ax: Any = None) -> Any:
+        """Stiffness of each joint, see `spinepipe.plot.stiffness`."""
+        coordinates = self.table["coordinate"]
+        return plot.stiffness(self, coordinate=coordinates.iloc[0], ax=ax)
+
     @property
-    def predicted(self) -> pd.DataFrame:
+    def predicted(self) -> xr.Dataset:
         """Motion under all loads of the cohort, see `spinepipe.simulate`."""
         return simulate(self.model, self.cohort)
 
@@ -160,10 +168,12 @@ def calibrate(
     own = every["stiffness"]
     own = own[own["fitted_to"] == label].reset_index(drop=True)
     fits = every["fits"]
+    # neutral zones are of a run alone
+    said = [one for one in concluded(study, cohort, every) if one.verdict != "neutral_zone"]
     return Stiffness(
-        headline=_headline(own),
         table=own,
-        quality=fits[fits["fitted_to"] == label].reset_index(drop=True),
+        conclusions=said,
+        fits=fits[fits["fitted_to"] == label].reset_index(drop=True),
         stiffness=every["stiffness"],
         predicted_stiffness=every["predicted_stiffness"],
         errors=every["errors"],
@@ -248,10 +258,3 @@ def _model(
     )
     others = () if file is None else (one for one in file.effects if one.effect != BUSHING)
     return ModelFile(model=f"{NAME}_{name}", cohort=cohort.name, effects=(bushing, *others))
-
-
-def _headline(own: pd.DataFrame) -> str:
-    """How many stiffnesses are identifiable, and of how many specimens."""
-    known, every = int(own["identifiable"].eq(True).sum()), int((own["status"] != NOT_FITTED).sum())
-    specimens = own["specimen"].nunique()
-    return f"{known} of {every} stiffnesses of {specimens} specimens are identifiable."

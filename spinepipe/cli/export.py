@@ -1,7 +1,7 @@
 """`spinepipe export`: a specimen's model as an OpenSim file, or the tables of a study as CSV."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -14,12 +14,13 @@ from spinepipe.problems import InputError, one_of
 from spinepipe.report.words import count
 from spinepipe.schema.datapackage import FILE
 from spinepipe.studies import read as studies
-from spinepipe.studies.exports import Exported, problem
+from spinepipe.studies.exports import Exported, problem, required_result
 from spinepipe.studies.kind import WantedFiles
 from spinepipe.studies.registry import every_kind, files_of, function_at, kind_of
 from spinepipe.studies.study import Study
 from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_frame
+from spinepipe.tidy.tables import write_tidy
 
 
 def command(
@@ -33,6 +34,10 @@ def command(
     ] = None,
     tables: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="write all tables as CSV instead")
+    ] = None,
+    to: Annotated[
+        Literal["csv"] | None,
+        typer.Option(help="write few tidy tables, CSV beside Parquet, into results/STUDY/tidy"),
     ] = None,
     pose: Annotated[
         int | None, typer.Option(metavar="N", help="a sampled joint pose; default: the nominal one")
@@ -59,14 +64,17 @@ def command(
 ) -> int:
     """Write a specimen's model as an OpenSim file, or the tables of a study as CSV."""
     root = context.obj
-    if (output is None) == (tables is None):
+    if sum(one is not None for one in (output, tables, to)) != 1:
         raise WrongUsage(
-            "one of -o and --tables is needed", "a model: -o FILE; tables: --tables DIR"
+            "one of -o, --to and --tables is needed",
+            "a model: -o FILE; tidy tables: --to csv; all tables: --tables DIR",
         )
     ending = ".osim" if matrix is None else ".csv"
     if output is not None and output.suffix != ending:
         raise InputError([problem("-o", output.name, f"FILE{ending}", "rename it")])
     read, cohort = studies.check(root, known_study(study, root))
+    if to is not None:
+        return _write_tidy(read, cohort, root)
     if output is None:
         assert tables is not None
         return _write_tables(read, cohort, root, tables)
@@ -94,6 +102,15 @@ def command(
             with appearing(path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
     print(f"{output}: specimen {wanted.specimen}, {made.words}")
+    return 0
+
+
+def _write_tidy(study: Study, cohort: Cohort, root: Path) -> int:
+    """Write the tidy tables, and say which."""
+    page = required_result(root / files_of(study, cohort).page(), "choose another study")
+    for path in write_tidy(page.parent, study.kind):
+        print(path.relative_to(root))
+    print(f"{FILE} beside them has the units. Next: spinepipe cite {study.study}")
     return 0
 
 

@@ -48,6 +48,7 @@ COMMANDS = {
     "Use": {
         "compare": "set two studies side by side",
         "export": "write a specimen's model as an OpenSim file",
+        "cite": "give a paragraph of methods, references, versions",
         "archive": "pack a computed study as a zip, for the supplement of a paper",
     },
     "Help": {

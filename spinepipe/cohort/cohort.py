@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, wraps
+from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, TypeVarTuple
@@ -239,6 +240,12 @@ class Cohort:
     def tests(self) -> tuple[str, ...]:
         """Tests in the order in which ``loads.csv`` first names them."""
         return () if self.loads is None else tuple(self.loads["test"].unique())
+
+    @property
+    def data(self) -> Any:
+        """Motion and loads as `xarray.Dataset`, see `spinepipe.api.arrays.of_cohort`."""
+        # by name: what a job computes does not hang on it
+        return import_module("spinepipe.api.arrays").of_cohort(self)
 
     @property
     def has_frames(self) -> bool:

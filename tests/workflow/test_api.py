@@ -1,6 +1,9 @@
 """What a notebook gives and what a run writes agree to the last bit; examples in docstrings run."""
 
 import doctest
+import html
+import json
+import shutil
 from importlib import import_module
 from pathlib import Path
 
@@ -14,10 +17,14 @@ from small_project import Project
 import spinepipe as sp
 from spinepipe.cli import main
 from spinepipe.cohort import Cohort
+from spinepipe.tidy.tables import write_tidy
 
 ROOT = Path(__file__).parents[2]
 mpl.use("Agg")
-MODULES = ("cohorts", "stiffness", "simulation", "missing_effects", "sensitivity", "results")
+MODULES = (
+    *("arrays", "cohorts", "machine", "missing_effects", "results", "running"),
+    *("sensitivity", "simulation", "stiffness"),
+)
 
 
 def cohort_of(project: Project, name: str) -> Cohort:
@@ -64,7 +71,8 @@ def test_a_model_moves_as_its_errors_say(eight: Project) -> None:
     cohort = cohort_of(eight, straight_chains.NAME)
     fit = sp.calibrate(cohort, stiffness="per_joint", leave_out=None)
     keys = ["specimen", "test", "cycle", "step", "joint"]
-    both = fit.predicted.merge(cohort.motion, on=keys, suffixes=("", "_measured"))
+    predicted = fit.predicted.to_dataframe().reset_index()
+    both = predicted.merge(cohort.motion, on=keys, suffixes=("", "_measured"))
     off = (both["extension_deg"] - both["extension_deg_measured"]).abs()
     mean = off.groupby([both["specimen"], both["test"], both["joint"]]).mean().dropna()
     told = fit.errors[fit.errors["coordinate"] == "extension"]
@@ -87,7 +95,7 @@ def test_missing_effects_are_those_of_a_run(eight: Project) -> None:
     # the model goes on into a fit
     fit = sp.calibrate(cohort_of(eight, "chains"), base=found.model, leave_out=None)
     plain = sp.calibrate(cohort_of(eight, "chains"), leave_out=None)
-    assert fit.quality["cost"].sum() < 0.5 * plain.quality["cost"].sum()
+    assert fit.fits["cost"].sum() < 0.5 * plain.fits["cost"].sum()
 
 
 def test_why_an_effect_is_named_or_not_is_told(
@@ -165,4 +173,58 @@ def test_figures_and_pages_can_be_made(eight: Project, tmp_path: Path) -> None:
     assert len(sp.plot.stiffness(fit).lines) == len(cohort.specimen_names)
     assert len(sp.plot.left_out(fit).patches) == len(cohort.tests)
     fit.report(tmp_path / "fit.html")
-    assert fit.headline in (tmp_path / "fit.html").read_text()
+    for text in ((tmp_path / "fit.html").read_text(), fit._repr_html_()):
+        assert fit.headline in text
+        assert "data:image/png" in text
+    assert list(fit.quality) == ["light", "check", "finding"]
+    assert fit.cite().startswith("Stiffness in flexion")
+    assert fit.predicted["extension_deg"].attrs["units"] == "deg"
+
+
+def test_results_of_a_run_say_what_its_page_says(eight: Project, tmp_path: Path) -> None:
+    """The kind of which the page is made too; and its tidy tables beside it."""
+    folder = eight.path("results/range_of_motion")
+    run = sp.open_results(folder)
+    page = (folder / "report.html").read_text()
+    assert run.headline in html.unescape(page)
+    assert set(run.quality["light"]) <= {"ok", "check", "stop"}
+    assert "static equilibrium" in run.cite()
+    assert run.headline in html.unescape(run._repr_html_())
+    arrays = run.xarray("range_of_motion")["predicted_extension_deg"]
+    assert (arrays.attrs["units"], "step" in arrays.dims) == ("deg", True)
+    run.report(tmp_path / "copy.html")
+    assert (tmp_path / "copy.html").read_text() == page
+    shutil.copytree(folder, tmp_path / "results")
+    written = write_tidy(tmp_path / "results", "range_of_motion")
+    assert [one.stem for one in written] == ["angles", "stiffness", "quality"]
+    told = json.loads((tmp_path / "results/tidy/datapackage.json").read_text())
+    fields = told["resources"][0]["schema"]["fields"]
+    assert {"name": "predicted_extension_deg", "unit": "deg"}.items() <= next(
+        one for one in fields if one["name"] == "predicted_extension_deg"
+    ).items()
+    for one in written:
+        csv = pd.read_csv(one, keep_default_na=False, na_values=[""])
+        parquet = pd.read_parquet(one.with_suffix(".parquet"))
+        pd.testing.assert_frame_equal(csv, parquet, check_dtype=False)
+
+
+def test_a_study_is_cited(eight: Project, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["--root", str(eight.folder), "cite", "range_of_motion"]
+    assert main(asked) == 0
+    told = capsys.readouterr().out
+    assert "solved for static equilibrium" in told
+    assert "@article{molder2021," in told
+    assert "commit" not in told or len(told.split("commit now: ")[1].split()[0]) >= 7
+    assert main([*asked, "--csl"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["DOI"].startswith("10.12688/")
+    assert main(["--root", str(eight.folder), "cite", "cohort_stiffness"]) == 1
+    assert "report.html" in capsys.readouterr().err
+
+
+def test_a_run_is_started_where_it_is_not_up_to_date(eight: Project) -> None:
+    said: list[str] = []
+    run = sp.run(eight.path("config/studies/range_of_motion.yaml"), cores=1, say=said.append)
+    assert run.headline
+    assert any("Nothing to be done" in one for one in said)
+    with pytest.raises(sp.InputError, match="no such file"):
+        sp.run(eight.path("config/studies/nothing.yaml"))
