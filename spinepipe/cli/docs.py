@@ -1,11 +1,13 @@
 """`spinepipe docs`: the parts of the documentation that come from the code."""
 
-import argparse
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from spinepipe.files import appearing
-from spinepipe.reference.pages import PAGE, columns_page, outdated_pages, refresh
+from spinepipe.reference.pages import DOCS, TABLES, outdated_pages, refresh, table_pages
 
 FOLDER = Path("docs") / "figures"
 
@@ -17,41 +19,41 @@ PICTURES: Mapping[str, str] = {
 """Pictures of README and tutorial in `docs/figures`: the figure of a plain run that each copies."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Write, or only compare."""
-    parser.add_argument(
-        "--check", action="store_true", help="write nothing; fail where a page is out of date"
-    )
-    parser.add_argument(
-        "--figures",
-        action="store_true",
-        help="copy the pictures of README and tutorial from results instead",
-    )
-
-
-def run(options: argparse.Namespace) -> int:
-    """Write the pages that are out of date, or name them; or copy pictures."""
-    if options.figures:
-        return _pictures(options)
-    pages = outdated_pages(options.root)
+def command(
+    context: typer.Context,
+    check: Annotated[
+        bool, typer.Option("--check", help="write nothing; fail where a page is out of date")
+    ] = False,
+    figures: Annotated[
+        bool, typer.Option("--figures", help="copy the pictures of README and tutorial instead")
+    ] = False,
+) -> int:
+    """Write the generated parts of the documentation."""
+    root = context.obj
+    if figures:
+        return _pictures(root)
+    pages = outdated_pages(root)
     for path in pages:
-        name = path.relative_to(options.root)
-        if options.check:
+        name = path.relative_to(root)
+        if check:
             print(f"FAIL  {name}: out of date; run `spinepipe docs`")
         else:
             path.write_text(refresh(path.read_text(encoding="utf-8"), str(name)), "utf-8")
             print(f"wrote {name}")
-    if not options.check:
-        (options.root / PAGE).write_text(columns_page(), "utf-8")
-        print(f"wrote {PAGE}: the columns of all result tables")
+    if not check:
+        for place, text in table_pages().items():
+            path = root / DOCS / place
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, "utf-8")
+        print(f"wrote {TABLES}: a page for each result table")
     if not pages:
         print("ok    every generated part of docs/ is up to date")
-    return 1 if pages and options.check else 0
+    return 1 if pages and check else 0
 
 
-def _pictures(options: argparse.Namespace) -> int:
+def _pictures(root: Path) -> int:
     """Copy what was computed, and name what was not."""
-    found = copy_pictures(options.root)
+    found = copy_pictures(root)
     for name, there in found.items():
         source = PICTURES[name]
         told = f"wrote {FOLDER / name} from {source}"
