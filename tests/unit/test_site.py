@@ -50,7 +50,7 @@ def test_nothing_is_fetched_from_a_network(site: Path) -> None:
 def test_the_search_is_of_the_site_itself(site: Path) -> None:
     index = (site / "search" / "search_index.js").read_text("utf-8")
     assert "cohort_stiffness" in index
-    assert "search/search_index.js" in (site / "index.html").read_text("utf-8")
+    assert 'src="site/iframe-worker.js"' in (site / "index.html").read_text("utf-8")
 
 
 def test_it_can_be_read_in_an_hour_or_two() -> None:
