@@ -15,6 +15,7 @@ __all__ = [
     "closest",
     "did_you_mean",
     "first_of",
+    "nearest",
     "one_of",
 ]
 
@@ -54,21 +55,22 @@ class InputProblem:
 
     def __str__(self) -> str:
         """The problem as one line."""
+        return "; ".join(self.lines)
+
+    @property
+    def lines(self) -> tuple[str, str]:
+        """What stands where and may stand there; and what to do."""
         place = [_cut(self.file)]
         if self.row is not None:
             place.append(f"line {self.row}")
         if self.column is not None:
             place.append(_cut(self.column))
-        parts = [
-            f"{', '.join(place)}: found {_cut(self.found)}",
-            f"allowed: {_cut(self.allowed, LONGEST_ALLOWED)}",
-            _cut(self.remedy, LONGEST_ALLOWED),
-        ]
+        found, remedy = _cut(self.found), _cut(self.remedy, LONGEST_ALLOWED)
+        what = f"{', '.join(place)}: found {found}; allowed: {_cut(self.allowed, LONGEST_ALLOWED)}"
         if self.others:  # how many there are, and in which lines
             rows = f" row{'' if self.others == 1 else 's'} more: {_spans(self.rows)}"
-            parts.append(f"and {self.others}{rows if self.rows else ' more'}")
-        text = "; ".join(parts)
-        return " ".join(text.split())
+            remedy += f"; and {self.others}{rows if self.rows else ' more'}"
+        return " ".join(what.split()), " ".join(remedy.split())
 
 
 MOST_SPANS = 5
@@ -201,19 +203,21 @@ LONGEST_COMPARED = 60
 """Characters of a name that is compared with others."""
 
 
-def closest(name: str, known: Iterable[str]) -> str | None:
-    """The known name that is most like ``name``, or the only one that begins with it."""
+def nearest(name: str, known: Iterable[str], number: int = 3) -> list[str]:
+    """The known names that are most like ``name``, or the only one that begins with it."""
     if len(name) > LONGEST_COMPARED:
-        return None
+        return []
     names = [other for other in known if len(other) <= LONGEST_COMPARED]
     near = names
     if len(names) > MOST_COMPARED:
         near = nsmallest(MOST_COMPARED, names, key=lambda other: abs(len(other) - len(name)))
-    matches = get_close_matches(name, near, n=1, cutoff=0.6)
     longer = [other for other in names if other.startswith(name)]
-    if not matches and len(longer) == 1:
-        return longer[0]
-    return matches[0] if matches else None
+    return get_close_matches(name, near, n=number, cutoff=0.6) or longer * (len(longer) == 1)
+
+
+def closest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that is most like ``name``, or the only one that begins with it."""
+    return next(iter(nearest(name, known, 1)), None)
 
 
 def did_you_mean(name: str, known: Iterable[str], otherwise: str) -> str:

@@ -4,14 +4,16 @@ What went in, what came out and what it was made with; no job files, which can b
 same files give the same bytes: names are in order, and no date of a file is in the zip.
 """
 
-import argparse
 import os
 import subprocess
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
+from typing import Annotated
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+
+import typer
 
 from spinepipe.cli.find import known_study
 from spinepipe.files import appearing, is_hidden
@@ -64,23 +66,22 @@ FILES (sha256, name)
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which study, and where to."""
-    parser.add_argument("study", metavar="STUDY", help="name of a study that was computed")
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE.zip", help="file to write (default: STUDY.zip)"
-    )
-
-
-def run(options: argparse.Namespace) -> int:
-    """Write the zip and say what is in it and what is not."""
-    root, name = options.root, options.study
-    output = (options.output or Path(f"{name}.zip")).resolve()
+def command(
+    context: typer.Context,
+    study: Annotated[str, typer.Argument(help="name of a study that was computed")],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="FILE.zip", help="default: STUDY.zip"),
+    ] = None,
+) -> int:
+    """Pack a computed study as a zip, for the supplement of a paper."""
+    root, name = context.obj, study
+    output = (output or Path(f"{name}.zip")).resolve()
     if output.suffix != ".zip":
         at = "command line", None, "-o"
         raise InputError([InputProblem(*at, output.name, "FILE.zip", "rename it")])
     expected = Expected(str(root), *studies.check(root, known_study(name, root), starting=False))
-    study, files = expected.study, expected.files
+    files = expected.files
     full = [path for path in files.results(full=True) if path not in files.results()]
     full = [path for path in full if (root / path).exists()]
     results, run_by = [*files.results(), *full], "make full" if full else "make"
@@ -89,12 +90,12 @@ def run(options: argparse.Namespace) -> int:
         packed = {result: (root / result).read_bytes() for result in results}
         of_tables = [root / path for path in results if path.endswith(".parquet")]
         tables = {path.stem: read_metadata(path) for path in of_tables}
-        told = descriptor_of(study, expected.cohort, root / files.folder)
+        told = descriptor_of(expected.study, expected.cohort, root / files.folder)
         # written beside the page, of what the tables say
         beside = f"{files.folder}/{CONCLUSIONS.name}.parquet"
         if (root / beside).is_file():
             packed[beside] = (root / beside).read_bytes()
-        elsewhere = set(_packages(study))
+        elsewhere = set(_packages(expected.study))
         for path in _inputs(expected):
             shown = os.path.normpath(str(path).removeprefix(f"{root}/"))
             inside = path.resolve().is_relative_to(root) and not shown.startswith(("..", "/"))

@@ -4,10 +4,12 @@ A problem stops a run, a doubt (`warn`) does not: units and signs that no cell g
 cannot be right, as a spine ten times too large, is a problem unless cohort.yaml says it is meant.
 """
 
-import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated, Any
+
+import typer
 
 from spinepipe.cli.find import cohort_names, study_names, unknown
 from spinepipe.cohort import Cohort, Reader
@@ -22,39 +24,40 @@ from spinepipe.studies.registry import every_form, files_of, function_at, kind_o
 from spinepipe.studies.study import COHORTS, Study
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Names of studies or cohorts."""
-    parser.add_argument(
-        "names",
-        nargs="*",
-        metavar="STUDY",
-        help="studies or cohorts; all of config/ when none is named",
-    )
-    parser.add_argument(
-        "--results",
-        action="store_true",
-        help="look at result files instead; those that are not as written are removed",
-    )
-
-
-def run(options: argparse.Namespace) -> int:
-    """Print one line for what is sound and all problems of what is not."""
-    root: Path = options.root
-    if options.results:
-        return _run_results(root, options.names)
+def command(
+    context: typer.Context,
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAMES]...", help="studies or cohorts", show_default="all"),
+    ] = None,
+    results: Annotated[
+        bool,
+        typer.Option("--results", help="look at result files; those not as written are removed"),
+    ] = False,
+) -> int:
+    """Say what is wrong with cohorts and studies."""
+    root, names = context.obj, names or []
+    if results:
+        return _run_results(root, names)
     told: set[InputProblem] = set()
     warned: dict[str, tuple[InputProblem, ...]] = {}
-    if not options.names:
+    if not names:
         warned["config/studies"] = tuple(studies.strays(root))
         for warning in warned["config/studies"]:
             print(f"warn  {warning}")
-    sound = [_tell(title, look, told, warned) for title, look in _tasks(root, options.names)]
+    seen = [_tell(title, look, told, warned) for title, look in _tasks(root, names)]
+    problems = [asdict(one) for one in told]
+    warnings = [asdict(one) for group in warned.values() for one in group]
+    context.meta["data"] = {"checked": seen, "problems": problems, "warnings": warnings}
     if told:
         print(f"\n{count(len(told), 'problem')} in all; nothing was changed.")
-    if any(warned.values()):
-        number = sum(map(len, warned.values()))
+    if warnings:
+        number = len(warnings)
         print(f"\n{count(number, 'warning')} in all, which stop no run: look at the files first.")
-    return 0 if all(sound) else 1
+    if not told and len(names) == 1:
+        verb = "plan" if names[0] in study_names(root) else "show"
+        print(f"Next: spinepipe {verb} {names[0]}")
+    return 0 if all(one["ok"] for one in seen) else 1
 
 
 def _run_results(root: Path, names: list[str]) -> int:
@@ -65,7 +68,7 @@ def _run_results(root: Path, names: list[str]) -> int:
     """
     known = study_names(root)
     if strange := [name for name in names if name not in known]:
-        raise InputError([unknown("study", name, known) for name in strange])
+        raise unknown("study", strange[0], known)
     computed = [name for name in names or known if (root / "results" / name).is_dir()]
     damaged, sound = [], 0
     for name in computed:
@@ -123,7 +126,7 @@ def _tasks(root: Path, names: list[str]) -> list[Task]:
         elif name in known_cohorts:
             tasks.append(_cohort_task(root, name, read))
         else:
-            raise InputError([unknown("study", name, [*known_studies, *known_cohorts])])
+            raise unknown("study or cohort", name, [*known_studies, *known_cohorts])
     return tasks
 
 
@@ -184,7 +187,7 @@ def _described(cohort: Cohort) -> str:
 
 def _tell(
     title: str, look: Look, told: set[InputProblem], warned: dict[str, tuple[InputProblem, ...]]
-) -> bool:
+) -> dict[str, Any]:
     """Print how one thing is; what was told before is not told again.
 
     Parameters
@@ -203,7 +206,7 @@ def _tell(
         for problem in new:
             print(f"      {problem}")
         told.update(new)
-        return False
+        return {"name": title, "ok": False, "found": ""}
     print(f"ok    {title}: {seen.words}")
     new_warnings = {title: seen.warnings}
     folder = None if seen.cohort is None else str(seen.cohort.folder.resolve())
@@ -212,4 +215,4 @@ def _tell(
     for warning in (one for group in new_warnings.values() for one in group):
         print(f"warn  {warning}")
     warned |= new_warnings
-    return True
+    return {"name": title, "ok": True, "found": seen.words}

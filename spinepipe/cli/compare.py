@@ -1,10 +1,11 @@
 """`spinepipe compare`: two studies side by side, in the terminal and as a page."""
 
-import argparse
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from spinepipe.api.results import Results, compare
 from spinepipe.cli.find import unknown
@@ -37,29 +38,29 @@ BY_THE_CLOCK = "ended", "check_minutes"
 """The conclusion, rule and verdict, of a result that is compared with nothing."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which two studies, and where to."""
-    for name in ("a", "b"):
-        words = "name of a study that was computed, or a folder of its results"
-        parser.add_argument(name, metavar=name.upper(), help=words)
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="FILE.html", help="page to write besides"
-    )
+OF_EITHER = "name of a study that was computed, or a folder of its results"
 
 
-def run(options: argparse.Namespace) -> int:
-    """Print what differs, and write it as a page where one is asked for."""
-    if options.output and options.output.suffix != ".html":
+def command(
+    context: typer.Context,
+    a: Annotated[str, typer.Argument(help=OF_EITHER)],
+    b: Annotated[str, typer.Argument(help=OF_EITHER)],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="FILE.html", help="page to write")
+    ] = None,
+) -> int:
+    """Set two studies side by side."""
+    if output and output.suffix != ".html":
         place = "command line", None, "-o"
-        raise InputError([InputProblem(*place, options.output.name, "FILE.html", "rename it")])
-    both = side_by_side(*(_folder(name, options.root) for name in (options.a, options.b)))
+        raise InputError([InputProblem(*place, output.name, "FILE.html", "rename it")])
+    both = side_by_side(*(_folder(name, context.obj) for name in (a, b)))
     told = [*lines(both)]
-    if options.output:  # first: who reads the lines may stop early, as `head` does
+    if output:  # first: who reads the lines may stop early, as `head` does
         title = f"{both.names[0]} and {both.names[1]}"
-        with appearing(options.output) as temporary:
+        with appearing(output) as temporary:
             page = rendered("compare.html", (TEMPLATES,), title=title, both=both, levels=LEVELS)
             temporary.write_text(page, "utf-8")
-        told.append(f"\npage: {options.output}")
+        told.append(f"\npage: {output}")
     print("\n".join(told))
     return 0
 
@@ -77,7 +78,7 @@ def _folder(name: str, root: Path) -> Path:
         return Path(name).absolute()
     known = [path.name for path in folders_in(results)]
     if name not in known:
-        raise InputError([unknown("study with results", name, known)])
+        raise unknown("study with results", name, known)
     return results / name
 
 

@@ -1,6 +1,5 @@
 """`spinepipe doctor`: can this computer run the studies? Only the standard library is needed."""
 
-import argparse
 import os
 import platform
 import re
@@ -12,6 +11,9 @@ import sys
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from spinepipe.files import cache_home, cache_of_project, refusal
 from spinepipe.reference.licences import pinned
@@ -39,12 +41,13 @@ class Trouble(Exception):
         super().__init__(f"{found}; {remedy}")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The doctor asks nothing."""
-
-
-def run(options: argparse.Namespace) -> int:
-    """Print one line per examination; 1 if any of them failed."""
+def command(
+    context: typer.Context,
+    slurm: Annotated[
+        bool, typer.Option("--slurm", help="the cluster too: plugin, queue, limits of time")
+    ] = False,
+) -> int:
+    """Test this installation."""
     checks: dict[str, Callable[[Path], str]] = {
         "python": check_python,
         "libraries": check_libraries,
@@ -54,14 +57,20 @@ def run(options: argparse.Namespace) -> int:
         "cache": check_cache,
         "cores": check_cores,
     }
-    status = 0
+    if slurm:
+        from spinepipe.cli.slurm import check_slurm
+
+        checks["slurm"] = check_slurm
+    found = context.meta["data"] = []
     for name, check in checks.items():
         try:
-            print(f"ok    {name:10} {check(options.root)}", flush=True)
+            found.append({"check": name, "ok": True, "found": check(context.obj)})
         except (Trouble, OSError) as trouble:
-            print(f"FAIL  {name:10} {trouble}", flush=True)
-            status = 1
-    return status
+            found.append({"check": name, "ok": False, "found": str(trouble)})
+        print(
+            f"{'ok  ' if found[-1]['ok'] else 'FAIL'}  {name:10} {found[-1]['found']}", flush=True
+        )
+    return 0 if all(one["ok"] for one in found) else 1
 
 
 def check_python(root: Path) -> str:
@@ -160,9 +169,13 @@ def check_cache(root: Path) -> str:
 
 
 def check_cores(root: Path) -> str:
-    """How many cores this process may use."""
+    """How many cores a run takes."""
+    return f"{cores_here()}; `spinepipe run` takes all of them, -j N takes N"
+
+
+def cores_here() -> int:
+    """Cores that this process may use."""
     try:
-        cores = len(os.sched_getaffinity(0))
+        return len(os.sched_getaffinity(0))
     except AttributeError:  # only Linux tells which cores a process may use
-        cores = os.cpu_count() or 1
-    return f"{cores}; run `snakemake --cores {cores}`"
+        return os.cpu_count() or 1

@@ -4,12 +4,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from spinepipe import cohort as cohorts
+from spinepipe.cli.program import WrongUsage
 from spinepipe.cohort import Cohort
 from spinepipe.files import files_in, folders_in
-from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
+from spinepipe.problems import nearest
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS, STUDIES, Study
+
+MOST_NAMED = 5
+"""Known names that are listed where none is near."""
 
 
 def study_names(root: Path) -> list[str]:
@@ -27,8 +31,10 @@ def study_or_cohort(name: str, root: Path) -> tuple[Study | None, Cohort]:
 
     Raises
     ------
+    WrongUsage
+        When there is neither.
     InputError
-        When there is neither, or with every problem found in them.
+        With every problem found in them.
     """
     if name in study_names(root):
         return studies.check(root, name)
@@ -36,7 +42,7 @@ def study_or_cohort(name: str, root: Path) -> tuple[Study | None, Cohort]:
         return None, cohorts.read(root / COHORTS / name, every_form())
     if (root / name).is_dir() and "/" in name:
         return None, cohorts.read(root / name, every_form())
-    raise InputError([unknown("name", name, [*study_names(root), *cohort_names(root)])])
+    raise unknown("study or cohort", name, [*study_names(root), *cohort_names(root)])
 
 
 def known_study(name: str, root: Path) -> str:
@@ -44,20 +50,22 @@ def known_study(name: str, root: Path) -> str:
 
     Raises
     ------
-    InputError
+    WrongUsage
         When there is none.
     """
     if name not in study_names(root):
-        raise InputError([unknown("study", name, study_names(root))])
+        raise unknown("study", name, study_names(root))
     return name
 
 
-def unknown(what: str, name: str, known: Sequence[str]) -> InputProblem:
-    """A name on the command line that nothing has."""
-    remedy = did_you_mean(name, known, "correct the name, or the folder with --root")
-    return InputProblem(
-        "command line", None, None, f"unknown {what} '{name}'", one_of(known), remedy
-    )
+def unknown(what: str, name: str, known: Sequence[str]) -> WrongUsage:
+    """A name on the command line that nothing has, with the nearest three that there are."""
+    known = list(dict.fromkeys(known))  # a study and its cohort may be called alike
+    near = nearest(name, known)
+    listed = f"they are {', '.join(known)}" if 0 < len(known) <= MOST_NAMED else ""
+    remedy = f"did you mean {' or '.join(near)}?" if near else listed
+    otherwise = "spinepipe check lists all; another folder is named by --root"
+    return WrongUsage(f'there is no {what} "{name}"', remedy or otherwise)
 
 
 def specimen_of(cohort: Cohort, name: str | None) -> str:
@@ -65,11 +73,11 @@ def specimen_of(cohort: Cohort, name: str | None) -> str:
 
     Raises
     ------
-    InputError
+    WrongUsage
         When the cohort has no such specimen.
     """
     if name is None:
         return str(cohort.specimen_names[0])
     if name not in cohort.specimen_names:
-        raise InputError([unknown("specimen", name, cohort.specimen_names)])
+        raise unknown("specimen", name, cohort.specimen_names)
     return name

@@ -1,8 +1,10 @@
 """`spinepipe import`: files of a laboratory become a cohort folder."""
 
-import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
 
 from spinepipe import cohort as cohorts
 from spinepipe.documents.yaml_text import YamlDocument
@@ -23,31 +25,26 @@ RAW_FILES, RAW_LINES, RAW_WIDTH = 10, 8, 100
 """What is shown of a file that is not understood."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which YAML, whether a folder may be written again, and whether only to look."""
-    parser.add_argument("settings", type=Path, metavar="FILE.yaml", help="says what the files are")
-    parser.add_argument(
-        "--replace",
-        action="store_true",
-        help="write a cohort again that is there; files that are edited by hand stay",
-    )
-    parser.add_argument(
-        "--show",
-        action="store_true",
-        help="write no cohort: show the first rows as they were understood, and draw a page",
-    )
-
-
-def run(options: argparse.Namespace) -> int:
-    """Read all files, judge them, write the folder, and say what was done."""
-    if options.show:
-        return _show(options.settings, options.root)
+def command(
+    context: typer.Context,
+    settings: Annotated[Path, typer.Argument(metavar="FILE.yaml", help="says what the files are")],
+    replace: Annotated[
+        bool, typer.Option("--replace", help="write a cohort again; files edited by hand stay")
+    ] = False,
+    show: Annotated[
+        bool, typer.Option("--show", help="write no cohort: show what was understood, and a page")
+    ] = False,
+) -> int:
+    """Make a cohort from files of a testing machine, C3D, OpenSim."""
+    root = context.obj
+    if show:
+        return _show(settings, root)
     try:
-        imported = read(options.settings)
-        folder = options.root / COHORTS / imported.name
-        stayed, warnings = write_judged(imported, folder, options.replace)
+        imported = read(settings)
+        folder = root / COHORTS / imported.name
+        stayed, warnings = write_judged(imported, folder, replace)
     except InputError:
-        told = f"Nothing was written. `spinepipe import --show {options.settings}` shows the files"
+        told = f"Nothing was written. `spinepipe import --show {settings}` shows the files"
         print(f"{told} as they are understood.")
         raise
     for sentence in imported.sentences:

@@ -1,14 +1,18 @@
 """The program `spinepipe`: finds the command, and turns errors into one clear message.
 
 A command is a module of `spinepipe.cli` with a function ``command``, whose annotated parameters
-typer reads, and which returns the exit code (None: 0). It is imported when it is called for: help
+typer reads, and which returns the exit code (None: 0). What ``--json`` prints it
+puts into ``context.meta["data"]``. It is imported when it is called for: help
 is at once there, and `doctor` works where a library is missing.
 """
 
+import io
+import json
 import os
 import platform
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext, redirect_stdout
 from functools import wraps
 from importlib import import_module
 from io import TextIOWrapper
@@ -18,10 +22,12 @@ from typing import Annotated, Any, cast
 
 import typer
 from typer.core import TyperGroup
+from typer.exceptions import TyperException
 from typer.main import get_command
 
 from spinepipe import __version__
 from spinepipe.files import cache_home, cache_of_project, refusal
+from spinepipe.problems import nearest
 
 COMMANDS = {
     "Start": {
@@ -30,11 +36,12 @@ COMMANDS = {
     "Look": {
         "check": "say what is wrong with cohorts and studies",
         "show": "show measured data: curves, geometry, summary",
-        "plan": "say before an experiment which effects its tests could name",
+        "plan": "say what a run will do, and how long it takes",
     },
     "Compute": {
+        "run": "compute studies and write their reports",
         "index": "write the page of all studies, and say which are up to date",
-        "why": "say why an effect is named by a study, or why not",
+        "why": "say why a study is stale or failed, or why an effect is named or not",
     },
     "Use": {
         "compare": "set two studies side by side",
@@ -53,6 +60,22 @@ FINE, PROBLEM, USAGE, FAILED, STOPPED = 0, 1, 2, 3, 130
 
 CONFIG = Path("config") / "config.yaml"
 
+OF_ALL = {"--json": "--json", "-q": "--quiet", "--quiet": "--quiet"} | {
+    "-v": "--verbose",
+    "--verbose": "--verbose",
+}
+"""Options of every command, which may stand behind its name too."""
+
+MOST_PROBLEMS = 10
+"""That are told of one input; of more their number is."""
+
+
+class WrongUsage(Exception):
+    """Something typed that cannot be meant: what it is, and what to type."""
+
+    def __init__(self, what: str, remedy: str) -> None:
+        super().__init__(f"{what}\n  {remedy}")
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code.
@@ -67,14 +90,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for stream in (sys.stdout, sys.stderr):
             cast(TextIOWrapper, stream).reconfigure(encoding="utf-8", errors="surrogateescape")
     given = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
-    if "--root" in given:  # it may stand behind the command too
-        at = given.index("--root")
-        given = [*given[at : at + 2], *given[:at], *given[at + 2 :]]
+    own = given[: given.index("--")] if "--" in given else given
+    rest, first = given[len(own) :], [OF_ALL[one] for one in own if one in OF_ALL]
+    own = [one for one in own if one not in OF_ALL]
+    if "--root" in own:  # it may stand behind the command too
+        at = own.index("--root")
+        own = [*own[at : at + 2], *own[:at], *own[at + 2 :]]
+    # what stands behind `--` is for Snakemake: typer would take it for names
+    given = [*first, *own]
     try:
-        _app(args=given, prog_name="spinepipe")
-    except SystemExit as end:
-        return end.code if isinstance(end.code, int) else FINE
-    return FINE
+        code: object = _app(args=given, prog_name="spinepipe", standalone_mode=False, obj=rest[1:])
+    except TyperException as error:  # an option or a value that no command has
+        words = error.format_message().removesuffix(".")
+        of = getattr(error, "ctx", None)
+        path = "spinepipe" if of is None else of.command_path
+        _fail(f"{words[:1].lower()}{words[1:]}\n  {path} --help  says what there is")
+        return USAGE
+    except WrongUsage as error:
+        _fail(str(error))
+        return USAGE
+    return code if isinstance(code, int) else FINE
 
 
 class _Commands(TyperGroup):
@@ -84,14 +119,17 @@ class _Commands(TyperGroup):
         return [name for group in COMMANDS.values() for name in group]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        if cmd_name not in self.list_commands(ctx):
-            return None
+        known = self.list_commands(ctx)
+        if cmd_name not in known:
+            near = nearest(cmd_name, known)
+            remedy = f"did you mean {' or '.join(near)}?" if near else "spinepipe --help lists all"
+            raise WrongUsage(f'there is no command "{cmd_name}"', remedy)
         # `import` is a word of Python, so its module is `import_`
         module = f"spinepipe.cli.{cmd_name}{'_' if iskeyword(cmd_name) else ''}"
         try:
             function = import_module(module).command
         except ImportError as error:
-            _fail(cmd_name, f"{error}; `spinepipe doctor` says what is missing")
+            _fail(f"{error}\n  `spinepipe doctor` says what is missing")
             raise typer.Exit(PROBLEM) from None
         own = typer.Typer(add_completion=False, rich_markup_mode=None)
         own.command(name=cmd_name)(_guarded(cmd_name, function))
@@ -112,19 +150,47 @@ def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., No
         from spinepipe.model.spine import RefusedModel
         from spinepipe.problems import InputError
 
+        asked = given["context"].find_root().params
+        said = io.StringIO()
+        hidden = redirect_stdout(said) if asked["json"] or asked["quiet"] else nullcontext()
+        data: Any = {}
         try:
-            code = function(*args, **given) or FINE
+            with hidden:
+                if given["context"].meta["rest"] and name != "run":
+                    raise WrongUsage(
+                        f"{name} hands nothing to Snakemake", "leave out what follows --"
+                    )
+                code = function(*args, **given) or FINE
+            data = given["context"].meta.get("data")
+            if asked["json"] and data is None:
+                raise WrongUsage(f"{name} has no --json", "leave it out")
+            if asked["quiet"] and code and not asked["json"]:  # what is wrong, and no more
+                lines = said.getvalue().splitlines()
+                print("\n".join(one for one in lines if one[:4] not in ("ok  ", "warn")))
         except KeyboardInterrupt:
             code = STOPPED
         except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
             # what is still to be printed goes nowhere, or Python would complain at its end
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             code = FINE
-        except (DamagedFile, InputError, RefusedModel, OSError, ImportError) as error:
-            # these say what the user can mend, in one line; any other is a fault of ours, and is
-            # shown with its traceback
+        except (
+            *(DamagedFile, InputError, RefusedModel, WrongUsage, OSError, ImportError),
+        ) as error:
+            # these say what the user can mend; any other is a fault of ours, and is shown with its
+            # traceback
             named = isinstance(error, OSError) and error.filename
-            code = _fail(name, f"{error.filename}: {error.strerror}" if named else str(error))
+            words = f"{error.filename}: {error.strerror}" if named else str(error)
+            told = [words]
+            if isinstance(error, InputError):
+                told = ["\n  ".join(one.lines) for one in error.problems[:MOST_PROBLEMS]]
+            for one in told:
+                _fail(one)
+            if isinstance(error, InputError) and (more := len(error.problems) - len(told)):
+                print(f"and {more} more", file=sys.stderr)
+            data = {"error": words}
+            code = USAGE if isinstance(error, WrongUsage) else PROBLEM
+        if asked["json"]:
+            print(json.dumps(data, ensure_ascii=False, default=str, indent=1))
         raise typer.Exit(code)
 
     return run
@@ -161,11 +227,15 @@ def _begin(
             help="project folder (default: the nearest with config/config.yaml)",
         ),
     ] = None,
+    json: Annotated[bool, typer.Option("--json", help="machine-readable output")] = False,
+    quiet: Annotated[bool, typer.Option("-q", "--quiet", help="errors only")] = False,
+    verbose: Annotated[bool, typer.Option("-v", "--verbose", help="more detail")] = False,
     version: Annotated[
         bool,
         typer.Option("--version", is_eager=True, callback=_version, help="show the version"),
     ] = False,
 ) -> None:
+    context.meta["rest"] = context.obj
     context.obj = (root or project_root(Path.cwd())).resolve()
     # where the user's cache folder cannot be written, Matplotlib gets one inside the project; not
     # under `doctor`, which looks at that folder itself and says what to do
@@ -173,7 +243,6 @@ def _begin(
         os.environ["MPLCONFIGDIR"] = str(cache_of_project(context.obj) / "matplotlib")
 
 
-def _fail(command: str, message: str) -> int:
-    """Print a message to stderr; the exit code of a problem."""
-    print(f"spinepipe {command}: {message}", file=sys.stderr)
-    return PROBLEM
+def _fail(message: str) -> None:
+    """Print to stderr what is wrong, and below it what to do."""
+    print(f"error: {message}", file=sys.stderr)

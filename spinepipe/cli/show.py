@@ -1,9 +1,11 @@
 """`spinepipe show`: one specimen as text, and as a page or a picture."""
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from spinepipe.cli.find import specimen_of, study_or_cohort
 from spinepipe.files import appearing
@@ -17,30 +19,32 @@ from spinepipe.studies.study import Study
 PAGE, PICTURES = ".html", (".png", ".svg", ".pdf")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to show and where to draw it."""
-    parser.add_argument("name", metavar="STUDY_OR_COHORT", help="name of a study or cohort")
-    parser.add_argument("specimen", nargs="?", metavar="SPECIMEN", help="the first if left out")
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        metavar="FILE",
-        help="page, .html, or picture, .png, .svg or .pdf (default: results/show/<name>.html)",
-    )
-
-
-def run(options: argparse.Namespace) -> int:
-    """Print and draw."""
-    name = Path(options.name).name
-    chosen = f"{name}-{options.specimen}" if options.specimen else name
-    output = options.output or options.root / "results" / "show" / f"{chosen}{PAGE}"
+def command(
+    context: typer.Context,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="of a study or cohort")],
+    specimen: Annotated[
+        str | None, typer.Argument(help="of the cohort", show_default="the first")
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="page, .html, or picture, .png, .svg or .pdf; default: results/show/NAME.html",
+        ),
+    ] = None,
+) -> int:
+    """Show measured data: curves, geometry, summary."""
+    root, named = context.obj, Path(name).name
+    chosen = f"{named}-{specimen}" if specimen else named
+    output = output or root / "results" / "show" / f"{chosen}{PAGE}"
     if output.suffix not in (PAGE, *PICTURES):
         allowed = ", ".join((PAGE, *PICTURES))
         problem = InputProblem("command line", None, "-o", output.name, allowed, "rename the file")
         raise InputError([problem])
-    study, cohort = study_or_cohort(options.name, options.root)
-    specimen = specimen_of(cohort, options.specimen)
+    study, cohort = study_or_cohort(name, root)
+    specimen = specimen_of(cohort, specimen)
     view = view_of(cohort, specimen, *_loading(study))
     print(describe(cohort, view))
     kind = "page" if output.suffix == PAGE else "picture"

@@ -17,7 +17,7 @@ MOST_TOLD = 100_000
 """Characters that all messages together may have."""
 
 _LINE = re.compile(
-    r"^(?P<kind>      |warn  |  |spinepipe check: |spinepipe import: )"
+    r"^(?P<kind>      |warn  |error: )"
     r"(?P<place>(?:[^:]|:(?! )){1,400}?): found (?P<found>.*)",
     re.S,
 )

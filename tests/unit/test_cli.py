@@ -112,9 +112,28 @@ def test_check_by_name(tmp_path: Path, run: Run) -> None:
     code, out, _ = run("--root", tmp_path, "check", "straight", "probe")
     assert (code, len(out.splitlines())) == (0, 2)
     code, _, err = run("--root", tmp_path, "check", "prob")
-    assert code == 1
-    assert "unknown study 'prob'" in err
-    assert "did you mean 'probe'?" in err
+    assert (code, err) == (
+        2,
+        'error: there is no study or cohort "prob"\n  did you mean probe?\n',
+    )
+    code, out, _ = run("--root", tmp_path, "check", "probe")
+    assert out.splitlines()[-1] == "Next: spinepipe plan probe"
+
+
+def test_check_for_programs_and_quiet_ones(tmp_path: Path, run: Run) -> None:
+    """One document with all that is wrong; or, with --quiet, what is wrong alone."""
+    project(tmp_path, Size())
+    path = tmp_path / "config/studies/probe.yaml"
+    assert run("--root", tmp_path, "check", "-q") == (0, "", "")
+    path.write_text(path.read_text() + "sed: 4\n")
+    code, out, _ = run("--root", tmp_path, "check", "--json")
+    told = json.loads(out)
+    assert (code, [one["column"] for one in told["problems"]]) == (1, ["sed"])
+    assert {one["name"]: one["ok"] for one in told["checked"]}["study probe"] is False
+    code, out, _ = run("--root", tmp_path, "check", "--quiet")
+    assert (code, out.splitlines()[0]) == (1, "FAIL  study probe")
+    code, out, err = run("--root", tmp_path, "show", "straight", "--json")
+    assert (code, json.loads(out)["error"] in err) == (2, True)
 
 
 def test_check_of_results_removes_damaged_ones_and_nothing_else(tmp_path: Path, run: Run) -> None:
@@ -127,7 +146,7 @@ def test_check_of_results_removes_damaged_ones_and_nothing_else(tmp_path: Path, 
         path.write_text("a,b\n")
     code, _, error = run("--root", root, "check", "--results", "..")
     assert code != 0
-    assert "unknown study '..'" in error
+    assert 'there is no study ".."' in error
     assert damaged.exists()
     code, out, _ = run("--root", root, "check", "--results")
     assert code == 1
@@ -190,8 +209,8 @@ def test_show_moments_of_several_tests(tmp_path: Path, run: Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["straigt"], "did you mean 'straight'?"),
-        (["straight", "z"], "unknown specimen 'z'; allowed: one of a, b"),
+        (["straigt"], "did you mean straight?"),
+        (["straight", "z"], 'there is no specimen "z"\n  they are a, b'),
         (["straight", "-o", "x.bmp"], "found x.bmp; allowed: .html, .png, .svg, .pdf"),
     ],
 )
@@ -200,7 +219,7 @@ def test_show_of_what_is_not_there(
 ) -> None:
     project(tmp_path, Size())
     code, _, err = run("--root", tmp_path, "show", *arguments)
-    assert code == 1
+    assert code == (2 if "there is no" in says or "did you" in says else 1)
     assert says in err
 
 
@@ -337,8 +356,8 @@ def test_export_says_why_a_kind_has_none(tmp_path: Path, run: Run) -> None:
             "run `snakemake -j2 results/probe/poses",
         ),
         (True, [STUDY, "a", "--pose", "99", "-o", "a.osim"], "found pose 99; allowed: 0 to 11"),
-        (True, [STUDY, "z", "-o", "a.osim"], "unknown specimen 'z'"),
-        (True, ["prob", "a", "-o", "a.osim"], "did you mean 'probe'?"),
+        (True, [STUDY, "z", "-o", "a.osim"], 'there is no specimen "z"'),
+        (True, ["prob", "a", "-o", "a.osim"], "did you mean probe?"),
         (True, [STUDY, "a", "-o", "a.xml"], "allowed: FILE.osim"),
         (
             True,
@@ -359,7 +378,7 @@ def test_export_of_what_is_not_there(
     if computed:
         results(tmp_path, Size())
     code, _, err = run("--root", tmp_path, "export", *arguments)
-    assert code == 1
+    assert code == (2 if "there is no" in says or "probe?" in says else 1)
     assert says in err
 
 
@@ -541,14 +560,22 @@ def test_a_locale_of_ascii_alone_is_left_behind(tmp_path: Path) -> None:
     assert f"page: {root}/results/show/straight.html" in ended.stdout.decode()
 
 
-def test_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments, code in ((["--help"], 0), (["chek"], 2), ([], 2), (["check", "--help"], 0)):
-        with pytest.raises(SystemExit) as ended:
-            main(arguments)
-        assert ended.value.code == code
-    told = capsys.readouterr()
-    assert "doctor" in told.out
-    assert "invalid choice: 'chek'" in told.err
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (["--help"], 0, "doctor"),
+        ([], 0, "doctor"),
+        (["check", "--help"], 0, "--results"),
+        (["--version"], 0, "spinepipe 0"),
+        (["chek"], 2, 'error: there is no command "chek"\n  did you mean check?'),
+        (["check", "--al"], 2, "error: no such option: --al"),
+        (["export"], 2, "error: missing argument 'study'"),
+    ],
+)
+def test_usage(run: Run, arguments: list[str], code: int, says: str) -> None:
+    ended, out, err = run(*arguments)
+    assert ended == code
+    assert says in (err if code else out)
 
 
 def test_a_broken_library_is_one_message(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

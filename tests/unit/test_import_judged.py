@@ -336,7 +336,7 @@ def test_settings_of_the_wrong_form_are_told_in_words_of_a_yaml(
     assert old in document
     path.write_text(document.replace(old, new))
     assert run(tmp_path, path) == 1
-    said = capsys.readouterr().err
+    said = capsys.readouterr().err.replace("\n  ", "; ")
     assert told in said
     for word in ("tuple", "Tuple", "instance", "pattern", "constrained", "datetime"):
         assert word not in said

@@ -201,8 +201,13 @@ def test_the_command_tells_by_digests_what_is_up_to_date(
 ) -> None:
     expected = made(root, FIRST)
     assert main(["--root", str(root), "index"]) == 0
-    path = Path(capsys.readouterr().out.strip())
-    assert path == root / "results/index.html"
+    path = root / "results/index.html"
+    assert capsys.readouterr().out.splitlines() == [
+        "up to date    first",
+        "changed since second",
+        f"Page: {path}",
+        "Next: spinepipe why second, or  spinepipe run second",
+    ]
     assert "2 studies: 1 up to date, 1 changed since" in path.read_text()
     lost = root / expected.files.results()[0]
     lost.unlink()

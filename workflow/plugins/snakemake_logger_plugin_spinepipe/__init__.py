@@ -2,9 +2,11 @@
 
 It imports nothing of spinepipe: Snakemake imports it before the Snakefile says which copy of
 spinepipe counts. Who asks for Snakemake's words (`-n`, `--verbose`, `--quiet`) gets them from
-Snakemake's own handler.
+Snakemake's own handler. A program that starts Snakemake, such as `spinepipe run`, sets the variable
+`SPINEPIPE_EVENTS` and gets a JSON object a line instead, also of a dry run.
 """
 
+import json
 import os
 import sys
 from collections import Counter
@@ -15,6 +17,9 @@ from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
 from snakemake_logger_plugin_spinepipe.time_left import TimeLeft, duration, job_seconds
+
+EVENTS = "SPINEPIPE_EVENTS"
+"""Environment variable: the study that is run, or anything where there are several."""
 
 SECONDS_BETWEEN_LINES = 2.0
 MOST_FAILED_NAMED = 5
@@ -41,7 +46,9 @@ class LogHandler(LogHandlerBase):
         others = asked.dryrun or asked.verbose or asked.debug_dag or asked.show_failed_logs
         quiet = {choice.name for choice in asked.quiet or ()}
         touches = {"-t", "--touch"} & set(sys.argv)  # takes no time worth to be kept
-        self._speaks = quiet <= {"HOST"} and not (others or touches)
+        self._events = EVENTS in os.environ and not asked.verbose
+        self._speaks = self._events or (quiet <= {"HOST"} and not (others or touches))
+        self._dry = asked.dryrun
         self._root = Path.cwd()
         self._cores: int | None = None  # where jobs are submitted: nobody knows how long they wait
         self._time_left = TimeLeft({})
@@ -73,11 +80,13 @@ class LogHandler(LogHandlerBase):
         if self._speaks:
             self._speaks = False  # Python closes it again at exit
             self._write("\n".join(self._at_the_end()))
-            if self._cores:
+            if self._cores and not self._dry:
                 self._time_left.keep(self._root)
         super().close()
 
     def _write(self, text: str) -> None:
+        if self._events and not text.startswith("{"):
+            text = json.dumps({"event": "text", "text": text}) if text else ""
         sys.stderr.write(f"{text}\n" if text else "")
         sys.stderr.flush()
 
@@ -89,14 +98,21 @@ class LogHandler(LogHandlerBase):
                 return self._ahead(record)
             case LogEvent.JOB_INFO:
                 self._start(record)
+                if self._events:
+                    told = {"rule": record.rule_name, "study": record.wildcards.get("study", "")}
+                    return json.dumps({"event": "job", **told})
             case LogEvent.JOB_FINISHED:
                 return self._finish(record)
             case LogEvent.PROGRESS:
                 return self._progress(record)
             case LogEvent.ERROR:
-                return own_words(record.msg)
+                words = own_words(record.msg)
+                return json.dumps({"event": "error", "text": words}) if self._events else words
             case LogEvent.JOB_ERROR:
                 self._failed[record.jobid] = record
+                if self._events:
+                    name = self._named(record.jobid, record)
+                    return json.dumps({"event": "failed", "job": name, "why": record.rule_msg})
                 if record.rule_msg:  # submitted, and not in a group
                     return self._news(f"rule {record.rule_name}", record.rule_msg)
             case LogEvent.GROUP_ERROR:
@@ -111,7 +127,11 @@ class LogHandler(LogHandlerBase):
         """Of which kinds of studies reports are made, how many jobs, how long that takes."""
         stats = getattr(record, "per_rule_job_counts", None) or record.stats
         self._planned = Counter({rule: count for rule, count in stats.items() if rule != "total"})
-        self._time_left, self._line_at = TimeLeft(job_seconds(self._root)), record.created
+        known, study = job_seconds(self._root), os.environ.get(EVENTS, "")
+        own = {rule: known[f"{study}:{rule}"] for rule in stats if f"{study}:{rule}" in known}
+        self._time_left, self._line_at = TimeLeft({**known, **own}), record.created
+        if self._events:
+            return json.dumps({"event": "plan", "jobs": self._planned.total(), **self._left()})
         kinds = [
             rule.removesuffix("_report") + (f" ({count})" if count > 1 else "")
             for rule, count in self._planned.items()
@@ -120,12 +140,16 @@ class LogHandler(LogHandlerBase):
         jobs = f"{self._planned.total():,} jobs{self._time(', about {}')}"
         return ": ".join(filter(None, [", ".join(kinds), jobs]))
 
+    def _left(self, later: int = 0) -> dict[str, float]:
+        """Seconds left, for a program; nothing where nobody knows."""
+        totals = self._planned + Counter({self._newest: later})
+        return {"left": self._time_left.seconds(totals, self._cores)} if self._cores else {}
+
     def _time(self, words: str, later: int = 0) -> str:
         """Words about the time left; `later` jobs were made known by a checkpoint."""
         if not self._cores:
             return ""
-        totals = self._planned + Counter({self._newest: later})
-        return words.format(duration(self._time_left.seconds(totals, self._cores)))
+        return words.format(duration(self._left(later)["left"]))
 
     def _start(self, job: Any) -> None:
         if job.jobid not in self._jobs:
@@ -138,14 +162,20 @@ class LogHandler(LogHandlerBase):
     def _finish(self, record: Any) -> str:
         job = self._jobs[record.job_id]
         self._failed.pop(record.job_id, None)
-        self._time_left.finish(job.rule_name, record.created - job.created)
         study = job.wildcards.get("study", "")
+        self._time_left.finish(job.rule_name, record.created - job.created, study)
         self._last = ": ".join(filter(None, [study, job.rule_name]))
         pages = [Path(self._root, path) for path in job.output or () if path.endswith(".html")]
+        if self._events:
+            return None
         # the first one: what else a job of a page writes leads to it
         return "\n".join(f"{study}: {page.as_uri()}" for page in pages[:1])
 
     def _progress(self, record: Any) -> str | None:
+        if self._events:
+            now = {"done": record.done, "total": record.total, "last": self._last}
+            left = self._left(record.total - self._planned.total())
+            return json.dumps({"event": "progress", **now, **left})
         if record.created - self._line_at < SECONDS_BETWEEN_LINES:
             return None
         self._line_at = record.created

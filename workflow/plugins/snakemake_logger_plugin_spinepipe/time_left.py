@@ -25,7 +25,10 @@ _TRIED_S = 2.0
 
 
 def job_seconds(root: Path) -> dict[str, float]:
-    """Seconds of a job of each rule, of this machine where it has run them."""
+    """Seconds of a job of each rule, and of `study:rule` where this machine has run it.
+
+    Before this machine has run a rule, seconds of another one.
+    """
     found: dict[str, float] = {}
     for path in (root / SHIPPED, root / LAST_RUN):
         if path.is_file():
@@ -66,10 +69,13 @@ class TimeLeft:
         self._expected = expected
         self._done: Counter[str] = Counter()
         self._took: defaultdict[str, float] = defaultdict(float)
+        self._of_study: defaultdict[str, list[float]] = defaultdict(list)
         self._slower = probe() / expected[MACHINE] if MACHINE in expected else 1.0
 
-    def finish(self, rule: str, seconds: float) -> None:
-        """Count one finished job of this rule."""
+    def finish(self, rule: str, seconds: float, study: str = "") -> None:
+        """Count one finished job of this rule; a search of one study takes long, another does not."""
+        if study:
+            self._of_study[f"{study}:{rule}"].append(seconds)
         self._done[rule] += 1
         self._took[rule] += seconds
 
@@ -91,7 +97,8 @@ class TimeLeft:
     def keep(self, root: Path) -> None:
         """Write down what jobs took, for the next run here."""
         took = {rule: self._each(rule) for rule in self._done}
-        known = {**self._expected, **took, MACHINE: probe()}
+        own = {key: sum(each) / len(each) for key, each in self._of_study.items()}
+        known = {**job_seconds(root), **took, **own, MACHINE: probe()}
         temporary = root / f"{LAST_RUN}.{os.getpid()}"
         with temporary.open("w", encoding="utf-8", newline="") as file:
             csv.writer(file, lineterminator="\n").writerows(
