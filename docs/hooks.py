@@ -49,6 +49,10 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"Decisions": [f"decisions/{path.name}" for path in decisions]},
         {"Measured": [place for place in PLACES.values() if place.startswith("measured/")]},
     ]
+    use = next(part["Use"] for part in config.nav or [] if "Use" in part)
+    for name in ("install.md", "from-an-older-version.md"):
+        if (ROOT / "docs" / name).is_file():
+            use.append(name)
     results = next(part["Results"] for part in config.nav or [] if "Results" in part)
     results.append({"Tables": [{kind: pages} for kind, pages in tables.items()]})
     return config
