@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from spinepipe.files import appearing
-from spinepipe.reference.pages import DOCS, TABLES, outdated_pages, refresh, table_pages
+from spinepipe.reference.pages import DOCS, outdated_pages, refresh, table_pages
 
 FOLDER = Path("docs") / "figures"
 
@@ -42,10 +42,9 @@ def command(
             print(f"wrote {name}")
     if not check:
         for place, text in table_pages().items():
-            path = root / DOCS / place
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(text, "utf-8")
-        print(f"wrote {TABLES}: a page for each result table")
+            with appearing(root / DOCS / place) as temporary:
+                temporary.write_text(text, "utf-8")
+        print(f"wrote {DOCS}/table: a page for each result table")
     if not pages:
         print("ok    every generated part of docs/ is up to date")
     return 1 if pages and check else 0

@@ -387,28 +387,24 @@ def code(text: str) -> str:
 
 # --- columns of result tables ---------------------------------------------------------------------
 
-TABLES = "docs/table"
-"""Where they are written; nobody keeps them, as they follow from the tables alone."""
-
-_COLUMN_HEAD = ("column", "type", "unit", "range", "meaning", "an empty cell means")
+_COLUMN_HEAD = ("column", "meaning", "unit", "type", "range", "an empty cell means")
 
 
 def table_pages() -> dict[str, str]:
-    """One page per table, and one per kind that lists them; by their place below `docs`."""
+    """One page per table, one per kind that lists them; by their place below `docs`, not kept."""
     found = {}
     for name, kind in every_kind().items():
         tables = sorted(kind.tables, key=lambda one: one.name)
         rows = [(f"[{shape.name}]({name}/{shape.name}.md)", shape.about) for shape in tables]
-        told = f"What the study asks: [{name}](../studies/{name}.md)"
-        head = f"# Tables of {name}"
-        found[f"table/{name}.md"] = f"{head}\n\n{told}\n\n{table(('table', 'what'), rows)}\n"
+        head = f"# Tables of {name}\n\nWhat the study asks: [{name}](../studies/{name}.md)"
+        found[f"table/{name}.md"] = f"{head}\n\n{table(('table', 'what'), rows)}\n"
         found |= {f"table/{name}/{shape.name}.md": _shape(name, shape) for shape in tables}
     return found
 
 
 def _shape(kind: str, shape: Table) -> str:
     rows = [
-        (code(c.name), c.type, c.unit, _range(c), c.meaning, c.empty or "never empty")
+        (code(c.name), c.meaning, c.unit, c.type, _range(c), c.empty or "never empty")
         for c in shape.columns
     ]
     key = f"Unique by {', '.join(map(code, shape.key))}."

@@ -79,7 +79,6 @@ def steps(project: Path) -> Iterator[list[str]]:
 def project(tmp_path: Path) -> Path:
     shutil.copytree(ROOT / "docs" / "examples", tmp_path / "docs" / "examples")
     (tmp_path / "config" / "studies").mkdir(parents=True)
-    shutil.copy(ROOT / "config" / "config.yaml", tmp_path / "config")
     return tmp_path
 
 
