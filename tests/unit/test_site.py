@@ -41,6 +41,14 @@ def test_every_page_is_there(site: Path) -> None:
         assert (site / place).with_suffix(".html").is_file(), place
 
 
+def test_the_menu_has_every_page() -> None:
+    told = (ROOT / "mkdocs.yml").read_text("utf-8") + (ROOT / "docs" / "hooks.py").read_text(
+        "utf-8"
+    )
+    for path in (*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "studies").glob("*.md")):
+        assert path.relative_to(ROOT / "docs").as_posix() in told, path
+
+
 def test_nothing_is_fetched_from_a_network(site: Path) -> None:
     for path in (*site.rglob("*.html"), *site.rglob("*.css")):
         found = _FETCHED.search(path.read_text("utf-8"))
