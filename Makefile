@@ -21,7 +21,7 @@ export XDG_CACHE_HOME := $(CURDIR)/.snakemake/cache
 export MPLCONFIGDIR := $(XDG_CACHE_HOME)/matplotlib
 endif
 
-.PHONY: all full demo wheel test test-full test-fast test-kernels lint bench validate mutants figures report env dev-env lock audit clean
+.PHONY: all full demo wheel test test-full test-fast test-kernels lint bench validate mutants figures site report env dev-env lock audit clean
 
 all: env  ## build the studies that config/config.yaml chooses
 	$(BIN)/python -m spinepipe.jobs.if_changed all $(BIN)/snakemake -j$(CORES) all
@@ -67,6 +67,9 @@ mutants: dev-env  ## put small faults into the code and count those that tests s
 
 figures: all  ## renew the pictures of README and tutorial from results
 	$(BIN)/spinepipe docs --figures
+
+site: dev-env  ## build the documentation as a site that needs no network: site/index.html
+	$(BIN)/mkdocs build --strict --quiet
 
 report: env  ## one HTML file with all figures and their captions
 	$(BIN)/snakemake --report results/report.html

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from spinepipe.files import appearing
-from spinepipe.reference.pages import PAGE, columns_page, outdated_pages, refresh
+from spinepipe.reference.pages import DOCS, outdated_pages, refresh, table_pages
 
 FOLDER = Path("docs") / "figures"
 
@@ -41,8 +41,10 @@ def command(
             path.write_text(refresh(path.read_text(encoding="utf-8"), str(name)), "utf-8")
             print(f"wrote {name}")
     if not check:
-        (root / PAGE).write_text(columns_page(), "utf-8")
-        print(f"wrote {PAGE}: the columns of all result tables")
+        for place, text in table_pages().items():
+            with appearing(root / DOCS / place) as temporary:
+                temporary.write_text(text, "utf-8")
+        print(f"wrote {DOCS}/table: a page for each result table")
     if not pages:
         print("ok    every generated part of docs/ is up to date")
     return 1 if pages and check else 0

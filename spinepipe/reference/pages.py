@@ -6,8 +6,8 @@ A page says where a part goes:
     <!-- end of generated -->
 
 What stands between the markers is written by `spinepipe docs` and compared in the tests: the list
-of effects, tables of configuration keys from the pydantic models, columns of a cohort. The page
-of all columns of all result tables is written as a whole, and nobody keeps it.
+of effects, tables of configuration keys from the pydantic models, columns of a cohort. The pages
+of result tables are written as a whole, and nobody keeps them.
 """
 
 import inspect
@@ -387,32 +387,31 @@ def code(text: str) -> str:
 
 # --- columns of result tables ---------------------------------------------------------------------
 
-PAGE = "docs/tables.md"
-"""Where it is written; nobody keeps it, as it follows from the tables alone."""
-
-_COLUMN_HEAD = ("column", "type", "unit", "range", "meaning", "an empty cell means")
+_COLUMN_HEAD = ("column", "meaning", "unit", "type", "range", "an empty cell means")
 
 
-def columns_page() -> str:
-    """All columns, kind by kind. How tables are read is told beside it."""
-    parts = [
-        "# Columns of result tables",
-        "Made by `spinepipe docs`. [How to read results](results.md)",
-    ]
+def table_pages() -> dict[str, str]:
+    """One page per table, one per kind that lists them; by their place below `docs`, not kept."""
+    found = {}
     for name, kind in every_kind().items():
-        parts.append(f"## Studies of kind [{name}](studies/{name}.md)")
-        parts += [_shape(shape) for shape in kind.tables]
-    return "\n\n".join(parts) + "\n"
+        tables = sorted(kind.tables, key=lambda one: one.name)
+        rows = [(f"[{shape.name}]({name}/{shape.name}.md)", shape.about) for shape in tables]
+        head = f"# Tables of {name}\n\nWhat the study asks: [{name}](../studies/{name}.md)"
+        found[f"table/{name}.md"] = f"{head}\n\n{table(('table', 'what'), rows)}\n"
+        found |= {f"table/{name}/{shape.name}.md": _shape(name, shape) for shape in tables}
+    return found
 
 
-def _shape(shape: Table) -> str:
+def _shape(kind: str, shape: Table) -> str:
     rows = [
-        (code(c.name), c.type, c.unit, _range(c), c.meaning, c.empty or "never empty")
+        (code(c.name), c.meaning, c.unit, c.type, _range(c), c.empty or "never empty")
         for c in shape.columns
     ]
     key = f"Unique by {', '.join(map(code, shape.key))}."
-    words = [f"### {shape.name}.parquet", shape.note, shape.about, key, table(_COLUMN_HEAD, rows)]
-    return "\n\n".join(word for word in words if word)
+    of = f"A table of studies of kind [{kind}](../../studies/{kind}.md)."
+    columns = table(_COLUMN_HEAD, rows)
+    words = [f"# {shape.name}.parquet", of, shape.note, shape.about, key, columns]
+    return "\n\n".join(word for word in words if word) + "\n"
 
 
 def _range(column: Column) -> str:

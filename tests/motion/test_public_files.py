@@ -1,7 +1,16 @@
 """Recordings that others have published, where they are at hand: read, or refused in a sentence.
 
-`SPINEPIPE_PUBLIC_FILES` names a folder with them; docs/studies/tracking.md says which repositories
-they are from. Catches a crash, and points that ezc3d reads otherwise.
+`SPINEPIPE_PUBLIC_FILES` names a folder with them. Catches a crash, and points that ezc3d reads
+otherwise. Tried on these repositories (commit: files; refused):
+
+- Biomechanical-ToolKit/BTKData (6aee093370de: 65 .c3d, 13 .trc; 7 .c3d of which 2 empty or damaged,
+  4 without a unit, 1 without markers, and 4 .trc of which 2 empty, 2 without markers)
+- opensim-org/opensim-core (0435b081dc38: 3 .c3d, 26 .trc; 3 .trc of another rate than DataRate)
+- opensim-org/opensim-models (20a888b9655e: 23 .trc; none)
+- pyomeca/ezc3d-testFiles (e40a8f8e8476: 9 .c3d; 3 that are cut off or without markers)
+- pyomeca/pyomeca (3594512b142e: a .c3d, a .trc; none)
+- felixchenier/kineticstoolkit (6aa3a6e0c098: 11 .c3d; none)
+- ross-wilkinson/opensim-model-fullBodyMuscleActuated (3cfbe329a8ef: a .trc; none)
 """
 
 import os

@@ -539,7 +539,8 @@ def test_docs(tmp_path: Path, run: Run) -> None:
     assert run("--root", tmp_path, "docs", "--check")[0] == 1
     code, out, _ = run("--root", tmp_path, "docs")
     assert (code, out.splitlines()[0]) == (0, "wrote docs/page.md")
-    assert "### poses.parquet" in (tmp_path / "docs" / "tables.md").read_text("utf-8")
+    table = tmp_path / "docs" / "table" / "joint_pose_sensitivity" / "poses.md"
+    assert "# poses.parquet" in table.read_text("utf-8")
     assert "linear_bushing" in page.read_text()
     assert run("--root", tmp_path, "docs", "--check")[0] == 0
 

@@ -9,7 +9,14 @@ from pathlib import Path
 import pytest
 
 from spinepipe.problems import InputError
-from spinepipe.reference.pages import END, columns_page, generators, outdated_pages, pages, refresh
+from spinepipe.reference.pages import (
+    END,
+    generators,
+    outdated_pages,
+    pages,
+    refresh,
+    table_pages,
+)
 from spinepipe.studies.registry import every_kind
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -26,9 +33,11 @@ def test_every_part_stands_on_some_page() -> None:
 
 
 def test_links_lead_somewhere() -> None:
-    for path in pages(ROOT):
+    made = {ROOT / "docs" / place for place in table_pages()}
+    for path in {*pages(ROOT), ROOT / "README.md"} - made:
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", path.read_text()):
-            assert target.startswith("http") or (path.parent / target).exists(), (path, target)
+            file = (path.parent / target).resolve()
+            assert target.startswith("http") or file.exists() or file in made, (path, target)
 
 
 def test_a_part_is_replaced_between_its_markers_only() -> None:
@@ -78,15 +87,17 @@ def test_an_effect_tells_what_its_options_change_and_how_it_is_searched() -> Non
     assert "with another `coordinate` they differ" in contact
 
 
-def test_the_page_of_columns_has_every_column_of_every_table() -> None:
-    page = columns_page()
+def test_every_column_of_every_table_has_its_page() -> None:
+    made = table_pages()
     for name, kind in every_kind().items():
-        part = page.partition(f"## Studies of kind [{name}]")[2].partition("\n## ")[0]
         for table in kind.tables:
-            own = part.partition(f"### {table.name}.parquet\n")[2].partition("\n### ")[0]
-            told = re.findall(r"^\| `(\w+)` \| (?:text|integer|number|flag) \|", own, re.MULTILINE)
+            page = made[f"table/{name}/{table.name}.md"]
+            told = re.findall(
+                r"^\| `(\w+)` \| .* \| (?:text|integer|number|flag) \|", page, re.MULTILINE
+            )
             assert tuple(told) == table.names
-            assert table.about in own
+            assert table.about in page
+            assert f"[{table.name}]({name}/{table.name}.md)" in made[f"table/{name}.md"]
 
 
 def test_bars_in_cells_are_escaped() -> None:

@@ -41,7 +41,9 @@ def test_its_docs_are_generated(toy_copy: Project) -> None:
     python(toy_copy, "-m", "spinepipe.cli", "docs")
     page = toy_copy.path("docs/studies/joint_count.md").read_text("utf-8")
     assert "what each count is multiplied by" in page
-    assert "number of joints" in toy_copy.path("docs/tables.md").read_text("utf-8")
+    assert "number of joints" in toy_copy.path("docs/table/joint_count/joints.md").read_text(
+        "utf-8"
+    )
 
 
 @pytest.mark.full
