@@ -8,7 +8,7 @@
 # %%
 import spinepipe as sp
 
-cohort = sp.import_machine("docs/examples/testing_machine/rig.yaml", accuracy_deg=0.5)
+cohort = sp.import_machine("docs/examples/testing_machine/rig.yaml", accuracy_deg=0.1)
 sp.check(cohort)
 
 # %% [markdown]
@@ -32,7 +32,7 @@ ax = sp.plot.curves(cohort, "flexion_extension", predicted=fit.predicted)
 # all of them.
 
 # %%
-found = sp.find_missing_effects(cohort, effort="quick", effects=["neutral_zone"])
+found = sp.find_missing_effects(cohort)
 found
 
 # %% [markdown]

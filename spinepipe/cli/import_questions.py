@@ -5,6 +5,7 @@ import re
 import sys
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +19,15 @@ from spinepipe.cohort.cohort import joint_names
 from spinepipe.documents.yaml_text import YamlDocument, yaml_of_text
 from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.report.words import count, listed
-from spinepipe.studies.discrepancy.search.noise import USUAL_ACCURACY
 from spinepipe.testing_machine.channels import DIRECTIONS
 from spinepipe.testing_machine.folder import read
 from spinepipe.testing_machine.sniff import seen, unit_of
 from spinepipe.testing_machine.suggest import ANSWERS, Suggestion, likely_unit, suggested
 
 SETTINGS = "import.yaml"
+
+USUAL_DEG = 0.1
+"""Accuracy of one angle that is suggested: rigs are seldom better."""
 
 NO_NAMES = ("raw", "data", "csv", "files", "export")
 """Names of folders that say nothing about a cohort."""
@@ -86,7 +89,7 @@ def described(
     if vertebrae is None:
         shown = " ".join(suggestion.vertebrae)
         vertebrae = ask.ask("Which vertebrae, from the lowest, which is held?", shown)
-    suggestion.vertebrae = tuple(re.split(r"[\s,]+", vertebrae.strip()))
+    suggestion = replace(suggestion, vertebrae=tuple(re.split(r"[\s,]+", vertebrae.strip())))
     _joints(suggestion, ask)
     own = next(
         (n for n in (folder.name, folder.parent.name) if n.lower() not in NO_NAMES), "my_lab"
@@ -102,8 +105,8 @@ def described(
         "source": ask.ask("Source: who measured, when, how; licence", "not told"),
         "vertebrae": list(chain),
     }
-    if suggestion.load_point_mm is not None:
-        header["load_point_mm"] = list(suggestion.load_point_mm)
+    for point in suggestion.load_points_mm.values():
+        header["load_point_mm"] = list(point)
     kept, _ = _cycles(folder, suggestion.settings(header, 0))
     first = int(kept > 2)
     if kept > 2 and not ask.yes:
@@ -111,14 +114,13 @@ def described(
         first = int(typer.confirm(text, default=True))
     if accuracy_deg is None:
         _, repeats = _cycles(folder, suggestion.settings(header, first))
-        usual = round(float(np.degrees(USUAL_ACCURACY[3])), 6)
         told = (
             ""
             if np.isnan(repeats)
             else f" The cycles repeat within {repeats:.2g}, which is no accuracy."
         )
-        text = f"Accuracy of one angle, deg?{told} Rigs are seldom better than {usual:g}"
-        accuracy_deg = ask.ask(text, usual, type=float)
+        text = f"Accuracy of one angle, deg?{told} Rigs are seldom better than {USUAL_DEG:g}"
+        accuracy_deg = ask.ask(text, USUAL_DEG, type=float)
     header["accuracy"] = {"rotation_deg": accuracy_deg}
     return folder, suggestion.settings(header, first)
 
@@ -192,7 +194,7 @@ def _columns(of: Suggestion, ask: Questions) -> None:
         if what == "force":
             of.force_towards[key] = ask.ask("A positive number pushes to", "inferior")
             point = ask.ask("Where it acts, mm anterior, superior, right of the joint", "0 0 0")
-            of.load_point_mm = tuple(float(one) for one in point.split())
+            of.load_points_mm[key] = tuple(float(one) for one in point.split())
 
 
 def _print_columns(of: Suggestion) -> None:
@@ -200,8 +202,8 @@ def _print_columns(of: Suggestion) -> None:
     for file in of.files:
         _, loads, motion = of.channels(file)
         for one in (*loads, *motion):
-            there = ways[one["column"]][of.of[file.name][1]]
-            there += [one["positive"]] if one["positive"] not in there else []
+            told = ways[one["column"]][of.of[file.name][1]]
+            told += [one["positive"]] if one["positive"] not in told else []
     table = Table(box=None, pad_edge=False)
     for name in ("", "column", "values", "taken as", "a positive number turns towards"):
         table.add_column(name)

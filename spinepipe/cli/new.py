@@ -19,7 +19,7 @@ from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.columns import TABLES
 from spinepipe.files import appearing
 from spinepipe.imports.imported import csv_text
-from spinepipe.problems import InputError, one_of
+from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.report.words import count, listed
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form, every_kind, function_at, kind_of
@@ -27,9 +27,6 @@ from spinepipe.studies.study import COHORTS, STUDIES
 from spinepipe.testing_machine.channels import DIRECTIONS
 from spinepipe.testing_machine.folder import LEVEL_APART_MM
 from spinepipe.testing_machine.suggest import direction_of
-
-FIRST = ("discrepancy", "cohort_stiffness")
-"""Kinds that are offered first; all others follow by name."""
 
 SCHEMAS = Path("config") / "schemas"
 STEPS_PER_SIDE = 5
@@ -125,8 +122,9 @@ def _chosen(read: Cohort, name: str, yes: bool) -> str:
     InputError
         Where it can answer none, with why.
     """
-    ordered = [*FIRST, *(one for one in every_kind() if one not in FIRST)]
-    offered, lacks, problems = list[str](), list[str](), []
+    # what can be asked before there are data comes first, all others by name
+    ordered = sorted(every_kind(), key=lambda one: (kind_of(one).before_data is None, one))
+    offered, lacks, problems = list[str](), list[str](), list[InputProblem]()
     for kind in ordered:
         data = {"study": name, "kind": kind, "cohort": read.name}
         try:

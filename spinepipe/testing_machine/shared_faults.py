@@ -30,8 +30,8 @@ def told_once(
     """
     groups: dict[tuple[str, ...], list[InputProblem]] = defaultdict(list)
     for one in problems:
-        if found := OF_FORM.search(one.remedy):
-            groups["form", found["doubt"] or found["key"], one.remedy].append(one)
+        if of_form := OF_FORM.search(one.remedy):
+            groups["form", of_form["doubt"] or of_form["key"], one.remedy].append(one)
         elif one.found == NO_COLUMN:
             groups["column", str(one.column)].append(one)
         else:

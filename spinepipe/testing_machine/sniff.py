@@ -101,14 +101,13 @@ def seen(path: Path, name: str) -> SeenFile:
 
 def _forms(data: bytes) -> Iterator[FileForm]:
     """All forms that a file may have, but for its numbers; names are looked for later."""
-    common = {"names_line": 0}
     if data.startswith(b"PK"):
         try:
             sheets = len(openpyxl.load_workbook(BytesIO(data), read_only=True).sheetnames)
         except Exception:  # as in `open_table`, which then says what is wrong with it
             sheets = 1
         numbers = [None] if sheets == 1 else range(1, sheets + 1)
-        yield from (FileForm(delimiter="tab", sheet=one, **common) for one in numbers)
+        yield from (FileForm(delimiter="tab", sheet=one, names_line=0) for one in numbers)
         return
     encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8"
     try:
@@ -116,7 +115,8 @@ def _forms(data: bytes) -> Iterator[FileForm]:
     except UnicodeError:
         encoding = "latin-1"
     for mark in SEPARATORS:
-        yield FileForm(delimiter=mark, encoding=encoding, **common)
+        told = {"delimiter": mark, "encoding": encoding, "names_line": 0}
+        yield FileForm.model_validate(told)
 
 
 def _is_number(cell: str) -> bool:

@@ -60,7 +60,7 @@ SAID = {
 JOINT = re.compile(r"\b(S1|[LTC]\d{1,2})[-_/ ]?(S1|[LTC]\d{1,2})\b", re.IGNORECASE)
 
 
-@dataclass
+@dataclass(frozen=True, eq=False)
 class Suggestion:
     """What files are taken as; every part may be corrected before `settings` is asked for.
 
@@ -70,7 +70,7 @@ class Suggestion:
     taken : what each column is and its unit, by the key of the column.
     towards : where a positive moment turns the upper vertebra, by test; empty: not known.
     joints : joint that an angle moves, by key of the column; those left out move the lowest.
-    force_towards : direction of forces that count, by key of the column.
+    force_towards, load_points_mm : direction of forces that count and where they act, by key.
     """
 
     folder: Path
@@ -78,10 +78,10 @@ class Suggestion:
     of: Mapping[str, tuple[str, str]]
     taken: dict[str | int, tuple[str, str]]
     towards: dict[str, str]
-    vertebrae: tuple[str, ...] = ("L5", "L4")
-    joints: dict[str | int, str] = field(default_factory=dict)
+    vertebrae: tuple[str, ...]
+    joints: dict[str | int, str]
     force_towards: dict[str | int, str] = field(default_factory=dict)
-    load_point_mm: tuple[float, ...] | None = None
+    load_points_mm: dict[str | int, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def specimens(self) -> list[str]:
@@ -235,11 +235,9 @@ def suggested(folder: Path, files: Sequence[SeenFile], pattern: str | None) -> S
     forces = {key: ("no", unit) for key, (what, unit) in taken.items() if what == "force"}
     tests = dict.fromkeys(test for _, test in of.values())
     towards = {test: direction_of(test) for test in tests}
-    names = sorted(
-        {v for joint in joints.values() for v in JOINT.match(joint).groups()}, key=_height
-    )
-    vertebrae = {"vertebrae": tuple(names)} if names else {}
-    return Suggestion(folder, files, of, taken | forces, towards, joints=joints, **vertebrae)
+    named = {vertebra for joint in joints.values() for vertebra in re.findall(r"[SLTC]\d+", joint)}
+    chain = tuple(sorted(named, key=_height)) or ("L5", "L4")
+    return Suggestion(folder, files, of, taken | forces, towards, chain, joints)
 
 
 def likely_unit(what: str, size: float, clock: bool = False, before: str = "") -> str:

@@ -23,6 +23,9 @@ from spinepipe.studies.registry import kind_names
 def root(tmp_path: Path) -> Path:
     """A project with a cohort of landmarks, loads and motion, `straight`, and a study `probe`."""
     project(tmp_path, Size())
+    header = tmp_path / "config/cohorts/straight/cohort.yaml"
+    sd = "measurement_sd: {rotation_deg: 0.1, translation_mm: 0.1}\n"
+    header.write_text(header.read_text() + sd)
     return tmp_path
 
 

@@ -19,7 +19,7 @@ from spinepipe.progress import Progress
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.evidence import formula_error, joint_log_evidence
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, Variant
-from spinepipe.studies.discrepancy.search.lack_of_fit import LackOfFit, lack_of_fit
+from spinepipe.studies.discrepancy.search.lack_of_fit import OWN, LackOfFit, lack_of_fit
 from spinepipe.studies.discrepancy.search.refit import Refit, refit, starting_term
 from spinepipe.studies.discrepancy.search.screen import Screen, ScreenedVariant
 from spinepipe.studies.discrepancy.search.search_state import ELSE, PRIOR, Rules, look
@@ -288,7 +288,8 @@ class Posterior:
     def log_odds(self) -> Odds:
         """Of each set of names, with and without something else; less what all sets share.
 
-        Something else counts by its fits or by the first-order look, whichever has more.
+        Something else counts by its fits or by the first-order look, whichever has more; by its
+        fits alone where the look is of what a table can be, and one was fitted beside the set.
         """
         groups: dict[tuple[frozenset[str], bool], list[float]] = {}
         looks: dict[frozenset[str], list[float]] = {}
@@ -297,7 +298,9 @@ class Posterior:
             names, other = names_of(one.forms), has_table(one.forms)
             if np.isfinite(one.log_evidence):
                 groups.setdefault((names, other), []).append(self.log_odds_of(one))
-            if isinstance(one, FittedSet) and one.lack is not None and not other:
+            if other or not isinstance(one, FittedSet) or one.lack is None:
+                continue
+            if not (one.lack.family == OWN and self._tabled(one.forms)):
                 more = one.lack.log_evidence + float(np.log(ELSE / (1.0 - ELSE)))
                 looks.setdefault(names, []).append(self.log_odds_of(one) + more)
         found = {key: float(logsumexp(of)) for key, of in groups.items()}
@@ -305,6 +308,11 @@ class Posterior:
             seen = float(logsumexp(of))
             found[names, True] = max(found.get((names, True), -np.inf), seen)
         return found
+
+    def _tabled(self, forms: Forms) -> bool:
+        """Whether a table was fitted beside a set."""
+        fitted = [one.forms for one in self.fitted.values() if has_table(one.forms)]
+        return any({form for form in of if form.name != TABLE} == forms for of in fitted)
 
 
 def _best_forms(one: FittedSet, there: set[Variant]) -> Iterator[ScreenedVariant]:

@@ -91,15 +91,16 @@ def _model_of(
 ) -> BaselineFit:
     """The likeliest model with these effects and no table; the base where it has no fit.
 
-    ``beside`` : the same with tables, whose effects stand where something else is likely.
+    ``beside`` : the same with tables, whose effects stand where these make it likelier.
     """
-    if beside is not None and beside.baseline is not None:
-        at = beside.baseline
+    best = _likeliest(names, posterior, tables=False)
+    odds = -np.inf if best is None else posterior.log_odds_of(best)
+    at = beside.baseline if beside and posterior.log_odds_of(beside) > odds else None
+    if at is not None:
         named = [one for one in standing(at.fit) if one.form.name != TABLE]
         fit = run(joint_fit, at.suppose(named), at.setting, None)
         if fit.usable:
             return at.at(fit)
-    best = _likeliest(names, posterior, tables=False)
     return posterior.base if best is None or best.baseline is None else best.baseline
 
 
