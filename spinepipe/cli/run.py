@@ -82,7 +82,9 @@ def command(
     arguments += ["--verbose"] * asked["verbose"]
     begun = time.monotonic()
     one = wanted[0].study.study if len(wanted) == 1 else ""
-    run = Watched(Snakemake(root, arguments, one), asked["quiet"] or asked["json"])
+    run = Watched(
+        Snakemake(root, arguments, one, None if slurm else 3.0), asked["quiet"] or asked["json"]
+    )
     code = run.watch()
     if code != FINE:
         return code

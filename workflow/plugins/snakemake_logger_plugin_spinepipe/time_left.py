@@ -73,7 +73,7 @@ class TimeLeft:
         self._slower = probe() / expected[MACHINE] if MACHINE in expected else 1.0
 
     def finish(self, rule: str, seconds: float, study: str = "") -> None:
-        """Count one finished job of this rule; a search of one study takes long, another does not."""
+        """Count one finished job of this rule; another study's may take much longer."""
         if study:
             self._of_study[f"{study}:{rule}"].append(seconds)
         self._done[rule] += 1
