@@ -98,7 +98,7 @@ def test_a_failed_job_ends_with_its_own_words_and_3(toy_copy: Project) -> None:
 def test_a_stopped_run_keeps_what_is_finished(toy_copy: Project) -> None:
     """The one job left says that it is at work, and never ends by itself."""
     accident(toy_copy, "open('at_work', 'w').close(); __import__('time').sleep(1000)")
-    process = started(toy_copy, "run", STUDY, "--keep-going", "-j2", "-v")
+    process = started(toy_copy, "run", STUDY, "--keep-going", "-j2")
     while not toy_copy.path("at_work").exists():
         assert process.poll() is None, process.communicate()
         time.sleep(0.1)
