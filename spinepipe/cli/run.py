@@ -82,8 +82,9 @@ def command(
     arguments += ["--verbose"] * asked["verbose"]
     begun = time.monotonic()
     one = wanted[0].study.study if len(wanted) == 1 else ""
-    run = Watched(Snakemake(root, arguments, one), asked["quiet"] or asked["json"])
-    code = run.watch()
+    run = Snakemake(root, arguments, one, None if slurm else 3.0)
+    watched = Watched(run, asked["quiet"] or asked["json"], asked["verbose"])
+    code = watched.watch()
     if code != FINE:
         return code
     for expected in wanted:
@@ -126,8 +127,8 @@ def _set_effort(root: Path, expected: Expected, effort: Effort) -> Expected:
 class Watched:
     """A run that is told on one line, with the time left of the whole."""
 
-    def __init__(self, run: Snakemake, silent: bool) -> None:
-        self._run, self._silent = run, silent
+    def __init__(self, run: Snakemake, silent: bool, verbose: bool) -> None:
+        self._run, self._verbose = run, verbose
         self._console = Console(stderr=True, quiet=silent, highlight=False)
         self._done = self._total = 0
         self._told_at = 0.0
@@ -181,9 +182,10 @@ class Watched:
                 self._failed.append(event["job"])
             case "text" if event["text"]:
                 self._said.append(event["text"])
-                if event["text"].startswith("warn  ") or not self._total:
-                    return
-                bar.update(task, description=event["text"][:60])
+                if self._verbose or event["text"].startswith("warn  "):
+                    self._console.print(event["text"], markup=False)
+                elif self._total:
+                    bar.update(task, description=event["text"][:60])
 
     def _line(self, words: str) -> None:
         if time.monotonic() - self._told_at > _SECONDS_BETWEEN_LINES:

@@ -33,6 +33,9 @@ from spinepipe.jobs.digest import reading
 _JOBS = Path(__file__).resolve().parent
 _ONE_THREAD = ("OMP", "OPENBLAS", "MKL", "BLIS", "NUMEXPR", "VECLIB_MAXIMUM")
 _SECONDS_TO_DIE = 5
+_STOPPED = 130
+"""Exit code of a worker whose run has ended, by Ctrl-C most often."""
+
 _MOST_GROWN_KB = 400_000
 """A worker that a job made larger by this serves no further one: its memory would stay taken."""
 
@@ -216,7 +219,7 @@ def end_with_parent() -> None:
         parent = multiprocessing.parent_process()
         if parent is not None:
             parent.join()
-            os._exit(1)
+            os._exit(_STOPPED)
 
     threading.Thread(target=wait_for_it, daemon=True).start()
 
@@ -244,6 +247,8 @@ def _fate(worker: _Worker) -> str:
     if code is None:
         worker.process.kill()
         return "its worker process stopped answering and was ended"
+    if code == _STOPPED:
+        return "it was stopped with the run; the same command goes on"
     if code >= 0:
         return f"its worker process ended itself in mid-job with exit code {code}"
     try:

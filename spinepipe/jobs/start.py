@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -43,14 +44,23 @@ class Snakemake:
     code : of its end, once `events` is through.
     """
 
-    def __init__(self, root: Path, arguments: Sequence[str], study: str = "") -> None:
-        """``study`` : the one that is run, if it is one: its jobs of earlier runs tell the time."""
-        self.code = 0
+    def __init__(
+        self, root: Path, arguments: Sequence[str], study: str = "", grace_s: float | None = 3.0
+    ) -> None:
+        """Start it.
+
+        Parameters
+        ----------
+        study : the one that is run, if it is one: its jobs of earlier runs tell the time.
+        grace_s : after which it is killed when it was stopped; None where it has submitted jobs to
+            cancel. It would wait for the jobs that are at work, and half files are never kept.
+        """
+        self.code, self._grace_s = 0, grace_s
         environment = {**os.environ, "PYTHONUTF8": "1", "SPINEPIPE_EVENTS": study}
         if refusal(cache_home() / "snakemake"):
             environment["XDG_CACHE_HOME"] = str(cache_of_project(root))
         command = [sys.executable, "-m", "snakemake", *arguments]
-        # a session of its own: Ctrl-C reaches this process alone, which hands it on once
+        # a session of its own: Ctrl-C reaches this process alone, which hands it on
         self._process = subprocess.Popen(
             command,
             cwd=root,
@@ -68,8 +78,14 @@ class Snakemake:
         assert self._process.stdout is not None
 
         def stop(*_: object) -> None:
-            if self._process.poll() is None:
+            if self.code:  # asked for the second time
+                self._process.kill()
+            elif self._process.poll() is None:
                 self._process.send_signal(signal.SIGINT)
+                if self._grace_s is not None:
+                    kill = threading.Timer(self._grace_s, self._process.kill)
+                    kill.daemon = True
+                    kill.start()
             self.code = -signal.SIGINT
 
         before = {one: signal.signal(one, stop) for one in STOPPING}
@@ -82,7 +98,7 @@ class Snakemake:
             for one, handler in before.items():
                 signal.signal(one, handler)
             if self._process.poll() is None:  # who listened has gone
-                self._process.send_signal(signal.SIGINT)
+                self._process.kill()
                 self._process.wait()
 
 

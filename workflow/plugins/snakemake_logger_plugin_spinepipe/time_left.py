@@ -15,9 +15,6 @@ from pathlib import Path
 SHIPPED = Path("workflow") / "job_seconds.csv"
 """Seconds of one job by rule, measured by `snakemake -j2 all`; rule `(machine)` is `probe`."""
 
-INSTALLED = Path(__file__).parents[1] / "spinepipe" / "beside"
-"""Where a wheel has what lies beside a clone's packages."""
-
 LAST_RUN = Path(".snakemake") / "job_seconds.csv"
 """The same of runs here; may be deleted at any time."""
 
@@ -33,7 +30,7 @@ def job_seconds(root: Path) -> dict[str, float]:
     Before this machine has run a rule, seconds of another one.
     """
     found: dict[str, float] = {}
-    for path in (INSTALLED / SHIPPED, root / SHIPPED, root / LAST_RUN):
+    for path in (root / SHIPPED, root / LAST_RUN):
         if path.is_file():
             with path.open(encoding="utf-8", newline="") as file:
                 found |= {row["rule"]: float(row["seconds"]) for row in csv.DictReader(file)}
@@ -76,7 +73,7 @@ class TimeLeft:
         self._slower = probe() / expected[MACHINE] if MACHINE in expected else 1.0
 
     def finish(self, rule: str, seconds: float, study: str = "") -> None:
-        """Count one finished job of this rule; a search of one study takes longer than another."""
+        """Count one finished job of this rule; another study's may take much longer."""
         if study:
             self._of_study[f"{study}:{rule}"].append(seconds)
         self._done[rule] += 1
