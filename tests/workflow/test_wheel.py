@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-import sysconfig
 import tarfile
 from pathlib import Path
 from zipfile import ZipFile
@@ -100,7 +99,8 @@ def test_a_first_answer_offline_and_outside_of_the_repository(wheel: Path, tmp_p
     run(sys.executable, "-m", *ours, cwd=tmp_path)
     # libraries of the environment of the tests; what is installed there as editable is not seen
     (site,) = (tmp_path / "env/lib").glob("*/site-packages")
-    (site / "libraries.pth").write_text(sysconfig.get_path("purelib"))
+    libraries = [path for path in sys.path if path.endswith("site-packages")]
+    (site / "libraries.pth").write_text("\n".join(libraries))
 
     asked = ["unshare", "--map-root-user", "--net"]
     can = shutil.which("unshare") and subprocess.run([*asked, "true"], check=False).returncode == 0
@@ -131,4 +131,4 @@ def test_a_first_answer_offline_and_outside_of_the_repository(wheel: Path, tmp_p
     planned = run(
         python, "-m", "snakemake", "-n", "--quiet", "all", "-j1", "all", cwd=tmp_path / "all"
     )
-    assert "rror" not in planned
+    assert "joint_pose_sensitivity_against_gould_2024a" in planned  # published numbers are there
