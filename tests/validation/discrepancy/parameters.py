@@ -39,8 +39,8 @@ class Compared:
 
     @property
     def error(self) -> float:
-        """Share of the size."""
-        return abs(self.fitted - self.truth) / self.size
+        """Share of the size; none, NaN, where the truth is 0."""
+        return abs(self.fitted - self.truth) / self.size if self.size else np.nan
 
     @property
     def close(self) -> bool:

@@ -145,7 +145,7 @@ def parameters(rows: Sequence[Judged]) -> pd.DataFrame:
                 "gap": gap,
                 "n": len(ones),
                 "within_10_percent": sum(one.close for one in ones),
-                "median_error": float(np.median([one.error for one in ones])),
+                "median_error": float(np.nanmedian([one.error for one in ones])),
                 "with_interval": sum(one.inside is not None for one in ones),
                 "in_interval": sum(one.inside is True for one in ones),
             }
