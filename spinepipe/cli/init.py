@@ -115,7 +115,7 @@ def _run_demo(context: typer.Context, root: Path) -> int:
     report = Path("results") / DEMO / "report.html"
     asked = context.find_root().params
     run = Snakemake(root, [str(report), "--cores", f"{cores_here()}"], DEMO)
-    code = Watched(run, silent=asked["quiet"] or asked["json"]).watch()
+    code = Watched(run, silent=asked["quiet"] or asked["json"], verbose=asked["verbose"]).watch()
     if code == FINE:
         answers = (told.text for told in stored_conclusions(root / report.parent))
         print(f"{next(answers, '')}\nReport: {root / report}")
