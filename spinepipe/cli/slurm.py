@@ -27,10 +27,18 @@ def check_slurm(root: Path) -> str:
         raise Trouble("Snakemake's plugin for Slurm is not installed", remedy)
     if not (root / SLURM).is_file():
         raise Trouble(f"there is no {SLURM}", "copy it from a clone of spinepipe")
-    missing = [one for one in ("sinfo", "sbatch", "squeue", "scancel") if shutil.which(one) is None]
+    missing = [
+        one
+        for one in ("sinfo", "sbatch", "squeue", "scancel", "sacct")
+        if shutil.which(one) is None
+    ]
     if missing:
         remedy = "go to a login node, or load its module of Slurm"
         raise Trouble(f"{', '.join(missing)} cannot be found here", remedy)
+    own = subprocess.run(["sacct", "-n", "-X"], capture_output=True, check=False, timeout=SECONDS)
+    if own.returncode:
+        remedy = "add  -- --slurm-status-command squeue  to spinepipe run"
+        raise Trouble("`sacct` does not answer, so no run would hear of a job's end", remedy)
     profile = yaml.safe_load((root / SLURM).read_text("utf-8"))
     wanted = str((profile.get("default-resources") or {}).get("slurm_partition", ""))
     name, limit = _partition(wanted)

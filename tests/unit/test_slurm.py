@@ -20,7 +20,7 @@ def cluster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "profiles/slurm").mkdir(parents=True)
     shutil.copy(ROOT / "profiles/slurm/config.yaml", tmp_path / "profiles/slurm")
     (tmp_path / "bin").mkdir()
-    for name in ("sbatch", "squeue", "scancel"):
+    for name in ("sbatch", "squeue", "scancel", "sacct"):
         program(tmp_path / "bin" / name, "exit 0")
     monkeypatch.setenv("PATH", f"{tmp_path}/bin:{os.environ['PATH']}")
     monkeypatch.setattr(slurm, "find_spec", lambda name: name)
@@ -53,6 +53,14 @@ def test_the_queue_is_asked_before_anything_is_submitted(
             slurm.check_slurm(cluster)
     else:
         assert slurm.check_slurm(cluster).startswith("plugin and queue are there; partition")
+
+
+def test_a_cluster_without_accounting_is_told(cluster: Path) -> None:
+    """The plugin would ask for the state of its jobs in vain, and never end."""
+    program(cluster / "bin/sinfo", "echo 'all* infinite up'")
+    program(cluster / "bin/sacct", "exit 1")
+    with pytest.raises(doctor.Trouble, match="--slurm-status-command squeue"):
+        slurm.check_slurm(cluster)
 
 
 def test_a_missing_plugin_is_told(cluster: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,7 +46,8 @@ class LogHandler(LogHandlerBase):
         others = asked.dryrun or asked.verbose or asked.debug_dag or asked.show_failed_logs
         quiet = {choice.name for choice in asked.quiet or ()}
         touches = {"-t", "--touch"} & set(sys.argv)  # takes no time worth to be kept
-        self._events = EVENTS in os.environ and not asked.verbose
+        submitted = "SPINEPIPE_RUN" in os.environ  # inherited from the run that submits
+        self._events = EVENTS in os.environ and not (asked.verbose or submitted)
         self._speaks = self._events or (quiet <= {"HOST"} and not (others or touches))
         self._dry = asked.dryrun
         self._root = Path.cwd()
