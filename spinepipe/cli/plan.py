@@ -15,7 +15,6 @@ from spinepipe.cli.program import WrongUsage
 from spinepipe.jobs.expected import Expected
 from spinepipe.jobs.start import Snakemake
 from spinepipe.studies import read as studies
-from spinepipe.studies.discrepancy.settings import MOST_FITS
 from spinepipe.studies.registry import kind_of
 
 
@@ -45,7 +44,8 @@ def command(
     longer = {one.study.study: with_effort(one, effort) if effort else 1.0 for one in chosen}
     changed = [one for one in chosen if longer[one.study.study] != 1.0]
     jobs = planned(root, [one for one in chosen if one not in changed])
-    jobs += planned(root, changed, "--forcerun", "discrepancy_search")
+    searches = {f"{one.study.kind}_search" for one in changed}
+    jobs += planned(root, changed, "--forcerun", *sorted(searches))
     told = context.meta["data"] = []
     for one in chosen:
         name = one.study.study
@@ -80,12 +80,12 @@ def with_effort(expected: Expected, effort: Effort) -> float:
         For a kind of study that has no effort.
     """
     study: Any = expected.study
-    if study.kind != "discrepancy":
+    if not study.most_fits:
         raise WrongUsage(
             f"{study.study} is a study of kind {study.kind}, which has no effort",
-            "leave --effort out: it is of searches for a missing effect (discrepancy)",
+            "leave --effort out: it is of searches for a missing effect",
         )
-    return MOST_FITS[effort.value] / MOST_FITS[study.effort]
+    return float(study.most_fits[effort.value] / study.most_fits[study.effort])
 
 
 def checked(root: Path, name: str) -> Expected:

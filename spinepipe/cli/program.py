@@ -25,7 +25,7 @@ from typer.core import TyperGroup
 from typer.exceptions import TyperException
 from typer.main import get_command
 
-from spinepipe import __version__
+import spinepipe
 from spinepipe.files import cache_home, cache_of_project, refusal
 from spinepipe.problems import nearest
 
@@ -202,7 +202,8 @@ def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., No
 
 def _version(given: bool) -> None:
     if given:
-        print(f"spinepipe {__version__} (Python {platform.python_version()}, {platform.system()})")
+        python = f"Python {platform.python_version()}, {platform.system()}"
+        print(f"spinepipe {spinepipe.__version__} ({python})")
         raise typer.Exit()
 
 

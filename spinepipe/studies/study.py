@@ -1,6 +1,8 @@
 """What every study has, of whatever kind."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import ClassVar
 
 from pydantic import BaseModel, Field
 
@@ -29,6 +31,8 @@ class Study(BaseModel):
     """A question asked of one cohort: its kind, and the choices it leaves open."""
 
     model_config = FORM
+    most_fits: ClassVar[Mapping[str, int]] = {}
+    """Of the search of a kind that has one, by its effort; the search is the rule KIND_search."""
 
     study: str = Field(
         pattern=r"^[a-z0-9_]+$",

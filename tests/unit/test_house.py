@@ -54,6 +54,8 @@ ROOMS = (
         "studies",
         "report",
         "jobs",
+        "tidy",
+        "citing",
         "imports",
         "testing_machine",
         "kinds",

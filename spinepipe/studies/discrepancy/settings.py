@@ -1,6 +1,7 @@
 """The study kind that asks which effect a model lacks, where, and how sure that is."""
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, Field, StringConstraints, model_validator
 
@@ -79,16 +80,14 @@ class Nuisance(BaseModel):
     )
 
 
-MOST_FITS = {"quick": 10, "standard": 40, "full": 100}
-"""Of a search, by its effort."""
-
-
 GIVEN_UP = ("false_alarm", "bootstrap", "held_out")
 """Settings of versions before: they are accepted, and do nothing."""
 
 
 class Discrepancy(Study):
     """Find which effect the base model lacks, and prove it on motion that was held out."""
+
+    most_fits: ClassVar[Mapping[str, int]] = {"quick": 10, "standard": 40, "full": 100}
 
     @model_validator(mode="before")
     @classmethod

@@ -43,7 +43,7 @@ from spinepipe.studies.discrepancy.search.prediction import solve_on_record
 from spinepipe.studies.discrepancy.search.readings import SpecimenReadings, specimen_readings
 from spinepipe.studies.discrepancy.search.search import search
 from spinepipe.studies.discrepancy.search.search_state import Rules, SearchResult
-from spinepipe.studies.discrepancy.settings import MOST_FITS, Discrepancy
+from spinepipe.studies.discrepancy.settings import Discrepancy
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import DECLARED, SuspectedError, VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -147,7 +147,7 @@ def investigate(
         ready.coordinates,
         study.most_effects,
         # data that look wrong are no physics: nothing will be named, and a fit may take for ever
-        0 if errors else MOST_FITS[study.effort],
+        0 if errors else study.most_fits[study.effort],
     )
     found = search(baseline, rules, run, progress, until)
     on_record([found.base.fit, found.final.fit], baseline.readings, run)
