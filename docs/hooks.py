@@ -79,7 +79,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Lead links out of `docs/` to their place in the site; take away those without one."""
     here = page.file.src_uri
-    source = next((old for old, new in PLACES.items() if new == here), f"docs/{here}")
+    elsewhere = (old for old, new in PLACES.items() if new == here != "index.md")
+    source = next(elsewhere, f"docs/{here}")
 
     def lead(found: re.Match[str]) -> str:
         picture, words, target, anchor = found.groups()

@@ -61,6 +61,12 @@ def test_the_search_is_of_the_site_itself(site: Path) -> None:
     assert 'src="site/iframe-worker.js"' in (site / "index.html").read_text("utf-8")
 
 
+def test_the_first_page_leads_on(site: Path) -> None:
+    first = (site / "index.html").read_text("utf-8")
+    article = first[first.index("<article") : first.index("</article>")]
+    assert set(re.findall(r'href="([a-z-]+)\.html"', article)) >= {"tutorial", "limits", "import"}
+
+
 def test_it_can_be_read_in_an_hour_or_two() -> None:
     """Words by hand, of README and pages; decisions, generated parts and measured tables apart."""
     words = 0
