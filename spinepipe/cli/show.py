@@ -10,6 +10,7 @@ import typer
 from spinepipe.cli.find import specimen_of, study_or_cohort
 from spinepipe.files import appearing
 from spinepipe.problems import InputError, InputProblem
+from spinepipe.report.measured_summary import measured_summary
 from spinepipe.report.specimen import view_of
 from spinepipe.report.specimen_curves import curve_charts, measured_curves
 from spinepipe.report.specimen_page import specimen_page
@@ -34,6 +35,9 @@ def command(
             help="page, .html, or picture, .png, .svg or .pdf; default: results/show/NAME.html",
         ),
     ] = None,
+    everything: Annotated[
+        bool, typer.Option("--all", help="every load step in the terminal, as of one specimen")
+    ] = False,
 ) -> int:
     """Show measured data: curves, geometry, summary."""
     root, named = context.obj, Path(name).name
@@ -44,9 +48,16 @@ def command(
         problem = InputProblem("command line", None, "-o", output.name, allowed, "rename the file")
         raise InputError([problem])
     study, cohort = study_or_cohort(name, root)
+    whole = specimen is None and not everything
     specimen = specimen_of(cohort, specimen)
     view = view_of(cohort, specimen, *_loading(study))
-    print(describe(cohort, view))
+    tests, _ = _loading(study)
+    whole = whole and cohort.has_frames and cohort.loads is not None
+    summary = measured_summary(cohort, tests) if whole else None
+    if summary is None or summary.empty:
+        print(describe(cohort, view))
+    else:
+        print(f"{cohort.name}: {cohort.title}\n{summary.to_string(index=False)}")
     kind = "page" if output.suffix == PAGE else "picture"
     if not cohort.has_frames:
         print(f"\nno {kind}: {cohort.name} has neither landmarks.csv nor joints.csv to draw")
@@ -68,6 +79,7 @@ def command(
         with appearing(output) as temporary:
             temporary.write_bytes(picture)
     print(f"\n{kind}: {output}")
+    print(f"Next: spinepipe new study NAME --cohort {cohort.name}")
     return 0
 
 
