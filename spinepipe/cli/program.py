@@ -178,8 +178,9 @@ def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., No
         ) as error:
             # these say what the user can mend; any other is a fault of ours, and is shown with its
             # traceback
-            named = isinstance(error, OSError) and error.filename
-            words = f"{error.filename}: {error.strerror}" if named else str(error)
+            words = str(error)
+            if isinstance(error, OSError) and error.filename:
+                words = f"{error.filename}: {error.strerror}"
             told = [words]
             if isinstance(error, InputError):
                 told = ["\n  ".join(one.lines) for one in error.problems[:MOST_PROBLEMS]]

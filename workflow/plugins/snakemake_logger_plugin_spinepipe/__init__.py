@@ -160,7 +160,7 @@ class LogHandler(LogHandlerBase):
                 self._newest = job.rule_name
         self._jobs[job.jobid] = job
 
-    def _finish(self, record: Any) -> str:
+    def _finish(self, record: Any) -> str | None:
         job = self._jobs[record.job_id]
         self._failed.pop(record.job_id, None)
         study = job.wildcards.get("study", "")
@@ -175,8 +175,8 @@ class LogHandler(LogHandlerBase):
     def _progress(self, record: Any) -> str | None:
         if self._events:
             now = {"done": record.done, "total": record.total, "last": self._last}
-            left = self._left(record.total - self._planned.total())
-            return json.dumps({"event": "progress", **now, **left})
+            later = record.total - self._planned.total()
+            return json.dumps({"event": "progress", **now, **self._left(later)})
         if record.created - self._line_at < SECONDS_BETWEEN_LINES:
             return None
         self._line_at = record.created
