@@ -151,11 +151,12 @@ class Watched:
         if self._run.code == -signal.SIGINT:
             print(f"Stopped. {kept}; the same command goes on.", file=sys.stderr)
             return STOPPED
-        for words in (self._errors or self._said[-MOST_FAILED:])[:MOST_FAILED]:
+        told = self._errors or self._failed or self._said[-MOST_FAILED:]
+        for words in told[:MOST_FAILED]:
             print(f"error: {words}", file=sys.stderr)
         if not (self._failed or self._errors):
             return PROBLEM
-        more = len(self._errors) - MOST_FAILED
+        more = len(told) - MOST_FAILED
         also = f"{count(more, 'job')} more failed: spinepipe why STUDY. " if more > 0 else ""
         print(f"{also}{kept}. After mending, the same command goes on.", file=sys.stderr)
         return FAILED
@@ -176,7 +177,7 @@ class Watched:
                 )  # fmt: skip
                 if not self._console.is_terminal:
                     self._line(f"{self._done} of {self._total} jobs  {left}")
-            case "error":
+            case "error" if not event["text"].startswith("WorkflowError"):  # says no more
                 self._errors.append(event["text"])
             case "failed":
                 self._failed.append(event["job"])

@@ -78,7 +78,13 @@ def running(folder: Path, minutes: int) -> Iterator[dict[str, str]]:
     key = folder / "munge.key"
     key.write_bytes(os.urandom(128))
     key.chmod(0o600)
-    environment = {**os.environ, "SLURM_CONF": str(config)}
+    # jobs are submitted without variables of Slurm: its programs find this one by the path
+    (folder / "bin").mkdir()
+    srun = folder / "bin/srun"
+    srun.write_text(f'#!/bin/sh\nSLURM_CONF={config} exec {shutil.which("srun")} "$@"\n')
+    srun.chmod(0o755)
+    path = f"{folder}/bin:{os.environ['PATH']}"
+    environment = {**os.environ, "SLURM_CONF": str(config), "PATH": path}
     of_munge = (f"--{one}-file={folder}/munge.{one}" for one in ("key", "pid", "log", "seed"))
     commands = (
         ["munged", "--foreground", "--force", f"--socket={folder}/munge.socket", *of_munge],

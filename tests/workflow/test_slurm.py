@@ -50,7 +50,7 @@ def start(project: Project, cluster: dict[str, str]) -> "subprocess.Popen[str]":
     return subprocess.Popen(
         [sys.executable, "-m", "spinepipe.cli", *OPTIONS],
         cwd=project.folder,
-        env={**project.environment(), "SLURM_CONF": cluster["SLURM_CONF"]},
+        env={**project.environment(), **{name: cluster[name] for name in ("SLURM_CONF", "PATH")}},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
