@@ -188,7 +188,7 @@ def misfit(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
 
 
 def left_out(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
-    """Misfit of both models on each test and specimen, or half of its load steps, that was left out."""
+    """Misfit of both models on each part that was left out."""
     title, held_out = "Misfit on readings left out of the fit", tables["held_out"]
     rows = held_out[held_out["gap_base"].notna()] if len(held_out) else held_out
     frames = {}

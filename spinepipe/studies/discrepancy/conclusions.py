@@ -12,7 +12,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.page.study_page import ResultTables
-from spinepipe.report.words import count, level, plain
+from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.discrepancy import verdict as found
 from spinepipe.studies.discrepancy.alternatives import alternatives, next_test, unnamed
 from spinepipe.studies.discrepancy.curve_rows import stiffness_at_rest_and_loaded

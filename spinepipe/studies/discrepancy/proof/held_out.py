@@ -35,7 +35,8 @@ class FoldRow:
 
     Attributes
     ----------
-    kind : test, specimen or steps. left_out : readings, of which the training tells ``base.readings``.
+    kind : test, specimen or steps.
+    left_out : readings, of which the training tells ``base.readings``.
     base, with_effects : None where it tells none; the same where no effect is named.
     moved : chi2 of the difference between what the two predict.
     """
