@@ -29,7 +29,7 @@ from page_rules import (
 )
 from sweeps import sweep
 
-from spinepipe.api.missing_effects import PACKAGE, _result
+from spinepipe.api.missing_effects import _result
 from spinepipe.model.file import ModelFile
 from spinepipe.report.conclusions import Sentence, Told, sentences_of
 from spinepipe.report.forms.chart import Chart, Drawing
@@ -43,6 +43,8 @@ from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
 from spinepipe.studies.discrepancy.verdict import plain_data, verdict_of
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.read import check
+
+PACKAGE = "spinepipe.studies.discrepancy"
 
 Change = Callable[[dict[str, pd.DataFrame]], Mapping[str, pd.DataFrame]]
 
@@ -301,8 +303,8 @@ CASES: tuple[Case, ...] = (
          folds(test=(2.0, 1.0, False), specimen=(2.0, 1.0, False), two=True),
          left(test=0.5, specimen=0.5), specimens=2),
     Case("NAMED", "method_left_out tests", specimens=1),
-    Case("NAMED", "method_left_out specimens", settings={"tests": ["flexion"]}),
-    Case("NAMED", "method_left_out steps", settings={"tests": ["flexion"]}, specimens=1),
+    Case("NAMED", "method_left_out specimens", settings={"tests": ("flexion",)}),
+    Case("NAMED", "method_left_out steps", settings={"tests": ("flexion",)}, specimens=1),
     Case("NAMED", "carries untold; predicted check_none", without("held_out")),
     Case("NAMED", "predicted check_some",
          folds(test=(2.0, 1.0, False), specimen=(np.nan, np.nan, False))),
@@ -437,8 +439,8 @@ def test_a_notebook_says_what_the_page_says(root: Path) -> None:
         if case.tables is None:
             verdict = verdict_of(VERDICTS[case.answer] | case.changed)
             rows = {name: rows.to_dict("records") for name, rows in frames(case.answer).items()}
-            found = _result(DiscrepancyResults(verdict, rows, model, model), "linear model")
-            shown = made(root, case)[3]
+            settings, cohort, _, shown = made(root, case)
+            found = _result(settings, cohort, DiscrepancyResults(verdict, rows, model, model))
             assert found.headline == shown.at("answer")[0].text
             of_search = [one.text for one in shown.at("light") if one.rule == "ended"]
             assert [found.search] == (of_search or [""])
