@@ -371,7 +371,7 @@ def _confusions() -> Rows:
 
 def _held_out(wide: bool, named: bool) -> Rows:
     rows: Rows = []
-    folds = [("test", name) for name in TESTS] + [("steps", "every second load step")]
+    folds = [("test", name) for name in TESTS] + [("specimen", name) for name in SPECIMENS]
     for number, (kind, name) in enumerate(folds):
         base = 3.9 + 0.2 * number if wide else 1.0 + 0.01 * number
         done = {"status": "converged", "message": "", "worse": False}

@@ -188,7 +188,7 @@ def misfit(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
 
 
 def left_out(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
-    """Misfit of both models on each test, or half of the load steps, that was left out."""
+    """Misfit of both models on each part that was left out."""
     title, held_out = "Misfit on readings left out of the fit", tables["held_out"]
     rows = held_out[held_out["gap_base"].notna()] if len(held_out) else held_out
     frames = {}
@@ -202,7 +202,7 @@ def left_out(study: Discrepancy, cohort: Cohort, tables: StudyTables) -> Chart:
 
 
 _SIDES = dict(zip(MODELS, ("before", "after"), strict=True))
-_KINDS = {"test": "Left-out tests", "steps": "Left-out steps"}
+_KINDS = {"test": "Left-out tests", "specimen": "Left-out specimens", "steps": "Left-out steps"}
 ENDS = ("", "_low", "_high")
 _ALONE = {"before": "value", "before_low": "low", "before_high": "high"}
 

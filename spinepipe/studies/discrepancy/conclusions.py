@@ -12,11 +12,11 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value
 from spinepipe.report.page.study_page import ResultTables
-from spinepipe.report.words import count, level, plain
+from spinepipe.report.words import count, level, listed, plain
 from spinepipe.studies.discrepancy import verdict as found
 from spinepipe.studies.discrepancy.alternatives import alternatives, next_test, unnamed
 from spinepipe.studies.discrepancy.curve_rows import stiffness_at_rest_and_loaded
-from spinepipe.studies.discrepancy.lights import lights
+from spinepipe.studies.discrepancy.lights import FEW_SPECIMENS, lights
 from spinepipe.studies.discrepancy.misfits import (
     BASE,
     LARGE,
@@ -289,11 +289,11 @@ def _slope(row: pd.Series, at: str) -> Value:
 def _carries_over(
     verdict: Verdict, where: pd.DataFrame, held_out: pd.DataFrame
 ) -> Iterator[Conclusion]:
-    """Whether what the fit gains shows in left-out tests, or halves of the load steps.
+    """Whether what the fit gains shows in left-out tests and specimens, or halves of their steps.
 
     It does in a kind of fold where the misfit of all together falls, that of one fold at least
     below its interval before, and none is worse by more than noise makes; of tests the one that
-    gains most in the fit must be among those that fall.
+    gains most in the fit must be among those that fall, and specimens must be `FEW_SPECIMENS`.
     """
     if not stands_for(verdict):
         return
@@ -316,6 +316,7 @@ def _carries_over(
         falls = better[better["kind"] == one.kind]
         own = scored[scored["kind"] == one.kind]
         shown = one.kind != "test" or most in set(falls["fold"])
+        shown = shown and (one.kind != "specimen" or len(own) >= FEW_SPECIMENS)
         if one.gap_closed is None or falls.empty or own["worse"].any() or not shown:
             continue
         how = f"verdict: left_out, {one.kind}"
@@ -324,5 +325,10 @@ def _carries_over(
             good.append(one.kind)
             yield Conclusion("left_out", one.kind, {"value": change})
     nowhere = "unsure" if len(better) else "nowhere"
-    told = "worse" if scored["worse"].any() else good[0] if good else nowhere
-    yield Conclusion("carries", told, values, {"effects": stands_for(verdict)})
+    told = "both" if {"test", "specimen"} <= set(good) else good[0] if good else nowhere
+    told = "worse" if scored["worse"].any() else told
+    parts = listed([_PARTS[kind] for kind in dict.fromkeys(scored["kind"])])
+    yield Conclusion("carries", told, values, {"effects": stands_for(verdict), "parts": parts})
+
+
+_PARTS = {"test": "tests", "specimen": "specimens", "steps": "load steps"}

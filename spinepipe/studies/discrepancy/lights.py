@@ -135,7 +135,7 @@ def _predicted(held_out: pd.DataFrame, every: int) -> Conclusion:
     }
     names = {"folds": count(folds, "part")}
     light = "check_none" if not scored else "ok" if scored == folds else "check_some"
-    light = "ok_steps" if light == "ok" and tests.empty else light
+    light = "ok_halves" if light == "ok" and tests.empty else light
     light = "check_few" if light == "ok" and len(tests) and 2 * told < every else light
     return Conclusion("predicted", light, values, names)
 
@@ -207,8 +207,9 @@ def _sample(
         yield Conclusion("outliers", "check", {"n": n})
     if verdict.threshold.log_evidence is None:
         return
+    tests = len(study.tests or cohort.tests)
     values = {
-        "tests": Value(len(study.tests or cohort.tests), source="settings and cohort: tests"),
+        "tests": Value(tests, source="settings and cohort: tests"),
         "tried": Value(
             len(verdict.smallest_detectable) + len(verdict.not_testable),
             source="verdict: smallest_detectable, not_testable",
@@ -216,4 +217,5 @@ def _sample(
         "needed": Value(SURE, source="a name is said from here on"),
     }
     yield Conclusion("methods", "searched", values, names)
-    yield Conclusion("method_left_out", "tests")
+    left_out = {(True, True): "both", (True, False): "tests", (False, True): "specimens"}
+    yield Conclusion("method_left_out", left_out.get((tests > 1, specimens > 1), "steps"))

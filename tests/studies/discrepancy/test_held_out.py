@@ -9,7 +9,14 @@ from scipy.spatial.transform import Rotation
 from sweeps import sweep
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.discrepancy.proof.held_out import STEPS, TEST, FoldRow, HeldOut, held_out
+from spinepipe.studies.discrepancy.proof.held_out import (
+    SPECIMEN,
+    STEPS,
+    TEST,
+    FoldRow,
+    HeldOut,
+    held_out,
+)
 from spinepipe.studies.discrepancy.proof.linear_model import nuisance_size
 from spinepipe.studies.discrepancy.search.gaps import Gap
 from spinepipe.studies.discrepancy.search.readings import Repeats, SpecimenReadings
@@ -69,7 +76,7 @@ def only_driven(one: SpecimenReadings) -> SpecimenReadings:
 
 
 @sweep("tests", [("flexion",), ("flexion", "bending")])
-def test_load_steps_are_halved_where_tests_tell_nothing(tests: tuple[str, ...]) -> None:
+def test_load_steps_of_a_single_specimen_are_halved(tests: tuple[str, ...]) -> None:
     given = tuple(only_driven(one) for one in read({"a": 40.0}, tests, zone=True))
     result = proof(given, zone=True)
     assert [row.kind for row in result.folds] == [TEST] * (len(tests) > 1) * len(tests) + [STEPS]
@@ -85,6 +92,8 @@ def test_a_zone_that_other_tests_show_is_foreseen() -> None:
     assert [(row.kind, row.name) for row in result.folds] == [
         (TEST, "flexion"),
         (TEST, "extension"),
+        (SPECIMEN, "a"),
+        (SPECIMEN, "b"),
     ]
     assert result.base is not None
     assert result.base.rms > 2.0
@@ -99,6 +108,28 @@ def test_with_nothing_named_the_base_stands_in_for_the_model_with_effects() -> N
     result = proof(read({"a": 40.0, "b": 60.0}, ("flexion", "extension"), zone=False))
     assert all(row.with_effects == row.base for row in result.folds)
     assert (result.beats_base, result.tells, result.over_base) == (False, False, 0.0)
+
+
+def test_a_specimen_is_predicted_from_the_others_and_half_of_its_own_load_steps() -> None:
+    """Of its own first half alone a zone's width hangs on few readings; others share theirs."""
+    readings = read({"a": 40.0, "b": 60.0, "c": 50.0}, ("flexion",), zone=True)
+    alone, all_three = proof(readings[:1], zone=True), proof(readings, zone=True)
+    assert [(row.kind, row.name) for row in all_three.folds] == [(SPECIMEN, n) for n in "abc"]
+    assert all_three.folds[0].left_out == LOAD_STEPS * JOINTS * 3
+    with_others, by_itself = all_three.folds[0].readings, alone.folds[0].readings
+    assert with_others >= by_itself
+    closed = all_three.by_kind()[SPECIMEN].closed
+    assert closed is not None
+    assert closed > 0.9
+
+
+def test_an_effect_of_one_specimen_alone_does_not_carry_over() -> None:
+    """A zone that only one of three has, shared by all, predicts the other two worse."""
+    (zone,) = read({"a": 40.0}, ("flexion", "extension"), zone=True)
+    others = read({"b": 60.0, "c": 50.0}, ("flexion", "extension"), zone=False, seed=2)
+    result = proof((zone, *others), zone=True)
+    rows = {row.name: row for row in result.folds}
+    assert any(rows[name].worse for name in ("b", "c"))
 
 
 @sweep("shown, size", [(0.08, 1.0), (0.0, 0.03)])
@@ -151,9 +182,9 @@ def test_folds_are_pooled_by_their_sums() -> None:
 
 
 def test_kinds_are_told_apart() -> None:
-    steps = replace(row("s", 80.0, 40.0), kind=STEPS)
-    kinds = HeldOut((row("a", 100.0, 50.0), steps, UNTOLD)).by_kind()
-    assert {kind: of.over_base for kind, of in kinds.items()} == {TEST: 50.0, STEPS: 40.0}
+    specimen = replace(row("s", 80.0, 40.0), kind=SPECIMEN)
+    kinds = HeldOut((row("a", 100.0, 50.0), specimen, UNTOLD)).by_kind()
+    assert {kind: of.over_base for kind, of in kinds.items()} == {TEST: 50.0, SPECIMEN: 40.0}
 
 
 @sweep("before, after, told", [(4.27, 2.83, 0.34), (1.31, 0.23, 0.82)])

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from discrepancy_cases import SD_DEG, STUDY, TESTS, VERDICTS, frames, project, tables
+from discrepancy_cases import SD_DEG, SPECIMENS, STUDY, TESTS, VERDICTS, frames, project, tables
 from page_rules import (
     FORBIDDEN,
     all_verdicts,
@@ -29,7 +29,7 @@ from page_rules import (
 )
 from sweeps import sweep
 
-from spinepipe.api.missing_effects import PACKAGE, _result
+from spinepipe.api.missing_effects import _result
 from spinepipe.model.file import ModelFile
 from spinepipe.report.conclusions import Sentence, Told, sentences_of
 from spinepipe.report.forms.chart import Chart, Drawing
@@ -43,6 +43,8 @@ from spinepipe.studies.discrepancy.settings import Discrepancy, DiscrepancyBase
 from spinepipe.studies.discrepancy.verdict import plain_data, verdict_of
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 from spinepipe.studies.read import check
+
+PACKAGE = "spinepipe.studies.discrepancy"
 
 Change = Callable[[dict[str, pd.DataFrame]], Mapping[str, pd.DataFrame]]
 
@@ -109,8 +111,11 @@ def slopes(rest: float, loaded: float) -> Change:
     return change
 
 
-def folds(**kinds: tuple[float, float, bool]) -> Change:
-    """Left-out tests, or load steps: misfits, and whether it is worse."""
+def folds(two: bool = False, **kinds: tuple[float, float, bool]) -> Change:
+    """Left-out tests, specimens or load steps: misfits, and whether it is worse."""
+
+    specimens = SPECIMENS[:2] if two else SPECIMENS
+    names = {"test": TESTS, "specimen": specimens, "steps": ("every second load step",)}
 
     def change(made: dict[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
         rows = [
@@ -118,7 +123,7 @@ def folds(**kinds: tuple[float, float, bool]) -> Change:
             | {"readings": 72, "gap_base": base, "gap_with_effects": then, "worse": worse}
             | {"gap_base_low": base - 0.3, "gap_base_high": base + 0.3}
             for kind, (base, then, worse) in kinds.items()
-            for name in (TESTS if kind == "test" else ("every second load step",))
+            for name in names[kind]
         ]
         return {"held_out": pd.DataFrame(rows)}
 
@@ -228,9 +233,9 @@ FAR |= {"not_fitted": [["creep", "neutral_zone"], ["level_dependence", "somethin
 CASES: tuple[Case, ...] = (
     Case("NAMED", "verdict named; misfit_after named; misfit_base told; errors ok; sample ok; "
          "noise ok_repeats; by_test single; alternatives ahead; stiffness rises; remainder ok; "
-         "methods searched; method_left_out tests; predicted ok; carries test; "
-         "left_out test; left_out steps; tests check; set_up check", None,
-         left(test=0.4, steps=0.8)),
+         "methods searched; method_left_out both; predicted ok; carries both; "
+         "left_out test; left_out specimen; tests check; set_up check", None,
+         left(test=0.4, specimen=0.8)),
     Case("NAMED", "verdict large; certain stop; remainder stop", after(3.4, 3.1, 3.7)),
     Case("PART", "verdict part; remainder check; remains place; shape seen", after(1.2, 0.9, 1.5),
          {"effects": [EFFECT, SECOND]}),
@@ -281,21 +286,28 @@ CASES: tuple[Case, ...] = (
     # stiffness
     Case("NAMED", "stiffness falls", slopes(1.0, 0.5)),
     Case("NAMED", "stiffness alike", slopes(1.0, 1.05)),
-    # left-out tests and load steps: misfits of both models, and whether it is worse
-    Case("NAMED", "carries test", folds(test=(2.0, 1.0, False), steps=(2.0, 1.8, False)),
-         left(test=0.5, steps=0.1)),
-    Case("NAMED", "carries steps", folds(test=(2.0, 2.2, False), steps=(2.0, 1.0, False)),
-         left(test=-0.1, steps=0.5)),
-    Case("NAMED", "carries steps; left_out steps; predicted ok_steps",
+    # left-out tests, specimens and load steps: misfits of both models, and whether it is worse
+    Case("NAMED", "carries test", folds(test=(2.0, 1.0, False), specimen=(2.0, 1.8, False)),
+         left(test=0.5, specimen=0.1)),
+    Case("NAMED", "carries specimen", folds(test=(2.0, 2.2, False), specimen=(2.0, 1.0, False)),
+         left(test=-0.1, specimen=0.5)),
+    Case("NAMED", "carries specimen", not_where_it_matters, left(test=0.4, specimen=0.8)),
+    Case("NAMED", "carries steps; left_out steps; predicted ok_halves",
          folds(steps=(2.0, 1.0, False)), left(steps=0.5)),
-    Case("NAMED", "carries worse", folds(test=(2.0, 1.0, False), steps=(2.0, 3.0, True)),
-         left(test=0.5, steps=-0.5)),
+    Case("NAMED", "carries worse", folds(test=(2.0, 1.0, False), specimen=(2.0, 3.0, True)),
+         left(test=0.5, specimen=-0.5)),
     Case("NAMED", "carries nowhere; predicted check_few", folds(test=(2.0, 1.8, False)),
          left(test=0.1)),
     Case("NAMED", "carries unsure", not_where_it_matters, left(test=0.4)),
+    Case("NAMED", "carries test",
+         folds(test=(2.0, 1.0, False), specimen=(2.0, 1.0, False), two=True),
+         left(test=0.5, specimen=0.5), specimens=2),
+    Case("NAMED", "method_left_out tests", specimens=1),
+    Case("NAMED", "method_left_out specimens", settings={"tests": ("flexion",)}),
+    Case("NAMED", "method_left_out steps", settings={"tests": ("flexion",)}, specimens=1),
     Case("NAMED", "carries untold; predicted check_none", without("held_out")),
     Case("NAMED", "predicted check_some",
-         folds(test=(2.0, 1.0, False), steps=(np.nan, np.nan, False))),
+         folds(test=(2.0, 1.0, False), specimen=(np.nan, np.nan, False))),
     # what has no name, and what to do
     Case("PART", "curve left_out", None, {"tabulated": TABLE | {"held_out_closed": -0.2}}),
     Case("UNKNOWN", "curve fit", None, {
@@ -363,8 +375,8 @@ def test_every_sentence_belongs_to_a_study_that_was_tried() -> None:
 
 
 @sweep("row", [row for row in sentences_of(PACKAGE) if "left-out" in row.text])
-def test_left_out_is_always_a_test_or_load_steps(row: Sentence) -> None:
-    assert re.search(r"left-out (tests?|load steps|readings)", row.text)
+def test_left_out_is_always_a_test_a_specimen_or_load_steps(row: Sentence) -> None:
+    assert re.search(r"left-out (tests?|specimens?|load steps|readings|\{parts\})", row.text)
     if row.rule == "carries" and row.figure and row.verdict != "steps":
         assert "predicted from the others" in row.note
 
@@ -388,11 +400,11 @@ def test_numbers_of_the_page_are_those_of_the_tables(root: Path) -> None:
     for rule, model in (("misfit_base", "base"), ("misfit_after", "with_effects")):
         rms = where.loc[model, "rms_residual"]  # the root of chi2 / dof
         assert said(shown, rule, "key").values["value"].number == pytest.approx((rms**2 - 1) ** 0.5)
-    for one in verdict_of(VERDICTS["NAMED"] | left(test=0.4)).left_out:
+    for one in verdict_of(VERDICTS["NAMED"] | left(test=0.4, specimen=0.8)).left_out:
         change = 100.0 * (one.with_effects / one.base - 1.0)
         assert said(shown, "carries").values[one.kind].number == pytest.approx(change)
     text = said(shown, "carries").text.replace("\u00a0", " ")
-    assert "to left-out tests, where the misfit changes by −40 %" in text
+    assert "changes by −40 % in left-out tests and by −80 % in left-out specimens" in text
     assert "at rest to 1.000 N m/° at 5 N m" in said(shown, "stiffness").text.replace("\u00a0", " ")
     assert "0.97" in said(shown, "alternatives").text
     assert "0.02" in said(shown, "alternatives").text
@@ -427,8 +439,8 @@ def test_a_notebook_says_what_the_page_says(root: Path) -> None:
         if case.tables is None:
             verdict = verdict_of(VERDICTS[case.answer] | case.changed)
             rows = {name: rows.to_dict("records") for name, rows in frames(case.answer).items()}
-            found = _result(DiscrepancyResults(verdict, rows, model, model), "linear model")
-            shown = made(root, case)[3]
+            settings, cohort, _, shown = made(root, case)
+            found = _result(settings, cohort, DiscrepancyResults(verdict, rows, model, model))
             assert found.headline == shown.at("answer")[0].text
             of_search = [one.text for one in shown.at("light") if one.rule == "ended"]
             assert [found.search] == (of_search or [""])

@@ -37,7 +37,7 @@ def test_every_result_holds_the_rows_of_its_study(eight: Project) -> None:
         name: pq.read_metadata(eight.path(f"{FOLDER}/{name}.parquet")).num_rows for name in TABLES
     }
     assert rows["gap"] == 2 * 2 * 6 * 3 * 3  # specimens, tests, steps, joints, rotations
-    assert rows["held_out"] == 2  # tests
+    assert rows["held_out"] == 2 + 2  # tests, specimens
     assert rows.pop("next_tests") == rows.pop("tabulated") == 0  # all is named
     assert min(rows.values()) > 0
     assert eight.path(f"{FOLDER}/design.csv").read_text().startswith("effect_or_pair,test,")

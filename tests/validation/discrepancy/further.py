@@ -11,7 +11,7 @@ import numpy as np
 
 from spinepipe.studies.discrepancy.design.signatures import cohort_signatures
 from spinepipe.studies.discrepancy.design.testable import LEAD, judgements
-from spinepipe.studies.discrepancy.proof.held_out import STEPS, TEST, FoldRow, HeldOut
+from spinepipe.studies.discrepancy.proof.held_out import SPECIMEN, TEST, FoldRow, HeldOut
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import places, residual_frame, worst
 from spinepipe.studies.discrepancy.search.investigation import Investigation
@@ -44,10 +44,10 @@ def _told(ask: Callable[..., Told]) -> Callable[..., Told]:
 
 @_told
 def held_out_told(proof: HeldOut) -> Told:
-    """Of tests and load steps left out: share of the excess misfit (chi2) taken away, and rms."""
+    """Of tests and specimens left out: share of the excess misfit (chi2) taken away, and rms."""
     return {
         "tests": _of_folds([row for row in proof.folds if row.kind == TEST]),
-        "steps": _of_folds([row for row in proof.folds if row.kind == STEPS]),
+        "specimens": _of_folds([row for row in proof.folds if row.kind == SPECIMEN]),
         "all_closed": proof.closed,
         "beats_base": proof.beats_base,
     }

@@ -1,9 +1,9 @@
 """Held-out proof: whether what is named predicts readings that were left out of its fit.
 
-One test after the other is left out in all specimens. Where the base's prediction of these misses
-no more than noise (or there is only one test), as what it lacks acts in one test alone, every
-second load step is left out, then the others. Noise-whitened readings are independent, so that any
-of them may be left out.
+One test after the other is left out in all specimens. Then one specimen after the other is, but for
+every second load step, to which its own stiffness and sizes of effects are fitted; then the halves
+change places. Of a single specimen these halves tell of load steps alone. Noise-whitened readings
+are independent, so that any of them may be left out.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ from spinepipe.studies.discrepancy.proof.linear_model import (
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.gaps import Gap
 
-TEST, STEPS = "test", "steps"
+TEST, SPECIMEN, STEPS = "test", "specimen", "steps"
 
 SAME = 1e-6
 """Share of chi2 by which predictions that hang on nothing that was scored may differ."""
@@ -35,7 +35,8 @@ class FoldRow:
 
     Attributes
     ----------
-    kind : test or steps. left_out : readings, of which the training tells ``base.readings``.
+    kind : test, specimen or steps.
+    left_out : readings, of which the training tells ``base.readings``.
     base, with_effects : None where it tells none; the same where no effect is named.
     moved : chi2 of the difference between what the two predict.
     """
@@ -56,9 +57,9 @@ class FoldRow:
     def message(self) -> str:
         """What of it is not scored; empty where all is."""
         if not self.readings:
-            return "the other tests do not determine what these readings would be"
+            return "the rest does not determine what these readings would be"
         if self.readings < self.left_out:
-            return f"the other tests determine {self.readings} of {self.left_out} readings"
+            return f"the rest determines {self.readings} of {self.left_out} readings"
         return ""
 
     @property
@@ -150,9 +151,12 @@ def held_out(base: BaselineFit, final: BaselineFit) -> HeldOut:
         for number, test in enumerate(base.tests):
             out = {name: of == number for name, of in tests.items()}
             folds.append(_fold(test, TEST, models, [out]))
-    if HeldOut(tuple(folds)).closed is None:
-        halves = [{name: of == half for name, of in steps.items()} for half in (0, 1)]
-        folds.append(_fold("every second load step", STEPS, models, halves))
+    for one in steps:
+        halves = [
+            {name: (of == half) & (name == one) for name, of in steps.items()} for half in (0, 1)
+        ]
+        name, kind = (one, SPECIMEN) if len(steps) > 1 else ("every second load step", STEPS)
+        folds.append(_fold(name, kind, models, halves))
     return HeldOut(tuple(folds))
 
 
