@@ -48,12 +48,12 @@ def command(
         problem = InputProblem("command line", None, "-o", output.name, allowed, "rename the file")
         raise InputError([problem])
     study, cohort = study_or_cohort(name, root)
-    whole = specimen is None and not everything
+    of_all = specimen is None and not everything
     specimen = specimen_of(cohort, specimen)
     view = view_of(cohort, specimen, *_loading(study))
     tests, _ = _loading(study)
-    whole = whole and cohort.has_frames and cohort.loads is not None
-    summary = measured_summary(cohort, tests) if whole else None
+    of_all = of_all and cohort.has_frames and cohort.loads is not None
+    summary = measured_summary(cohort, tests) if of_all else None
     if summary is None or summary.empty:
         print(describe(cohort, view))
     else:

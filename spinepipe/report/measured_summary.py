@@ -17,7 +17,7 @@ def measured_summary(cohort: Cohort, tests: Sequence[str] | None = None) -> pd.D
 
     ``repeats_within`` : largest SD over cycles of one load step, in the unit of the motion.
     """
-    rows = []
+    rows: list[dict[str, object]] = []
     for name in cohort.specimen_names:
         one = measured_specimen(cohort, str(name), list(tests or cohort.tests))
         for test in one.tests:

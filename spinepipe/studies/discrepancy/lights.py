@@ -54,7 +54,7 @@ def lights(
         yield Conclusion("values", "stop_no_base", names=names)
     else:
         yield from _tests(verdict)
-        yield _predicted(results.table("held_out"), len(results.table("gap")))
+        yield _predicted(results.table("held_out"), results.table("gap"))
         yield from _set_up(verdict, results.table("imperfections"))
     values = [one for effect in verdict.effects for one in quantities(effect)]
     if values:
@@ -122,16 +122,17 @@ def _tests(verdict: Verdict) -> Iterator[Conclusion]:
     yield Conclusion("tests", light, values, {"names": listed(blind, len(blind))})
 
 
-def _predicted(held_out: pd.DataFrame, every: int) -> Conclusion:
-    """Whether the rest determines what was left out; ``every`` : readings in all."""
+def _predicted(held_out: pd.DataFrame, gap: pd.DataFrame) -> Conclusion:
+    """Whether the rest determines what was left out."""
     folds = len(held_out)
     scored = int(held_out["gap_base"].notna().sum()) if folds else 0
     tests = held_out[held_out["kind"] == "test"] if folds else held_out
     told = int(tests["readings"].sum()) if folds else 0
+    every = int(gap["readings"].sum()) if len(gap) else 0
     values = {
         "lost": Value(folds - scored, source="held_out: rows without a score"),
         "told": Value(told, source="held_out: readings of tests"),
-        "readings": Value(every, source="gap: rows"),
+        "readings": Value(every, source="gap: readings"),
     }
     names = {"folds": count(folds, "part")}
     light = "check_none" if not scored else "ok" if scored == folds else "check_some"
