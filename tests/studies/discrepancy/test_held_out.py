@@ -111,13 +111,12 @@ def test_with_nothing_named_the_base_stands_in_for_the_model_with_effects() -> N
 
 
 def test_a_specimen_is_predicted_from_the_others_and_half_of_its_own_load_steps() -> None:
-    """Of its own first half alone a zone's width hangs on few readings; others share theirs."""
+    """The zone is shared: with others less of a stays open than by half of its steps alone."""
     readings = read({"a": 40.0, "b": 60.0, "c": 50.0}, ("flexion",), zone=True)
     alone, all_three = proof(readings[:1], zone=True), proof(readings, zone=True)
     assert [(row.kind, row.name) for row in all_three.folds] == [(SPECIMEN, n) for n in "abc"]
     assert all_three.folds[0].left_out == LOAD_STEPS * JOINTS * 3
-    with_others, by_itself = all_three.folds[0].readings, alone.folds[0].readings
-    assert with_others >= by_itself
+    assert all_three.folds[0].readings > alone.folds[0].readings
     closed = all_three.by_kind()[SPECIMEN].closed
     assert closed is not None
     assert closed > 0.9
@@ -129,7 +128,7 @@ def test_an_effect_of_one_specimen_alone_does_not_carry_over() -> None:
     others = read({"b": 60.0, "c": 50.0}, ("flexion", "extension"), zone=False, seed=2)
     result = proof((zone, *others), zone=True)
     rows = {row.name: row for row in result.folds}
-    assert any(rows[name].worse for name in ("b", "c"))
+    assert [rows[name].worse for name in "abc"] == [False, True, True]
 
 
 @sweep("shown, size", [(0.08, 1.0), (0.0, 0.03)])

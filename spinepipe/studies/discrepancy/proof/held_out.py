@@ -1,9 +1,9 @@
 """Held-out proof: whether what is named predicts readings that were left out of its fit.
 
 One test after the other is left out in all specimens. Then one specimen after the other is, but for
-every second load step, to which its own stiffness and sizes of effects are fitted; then the halves
-change places. Of a single specimen these halves tell of load steps alone. Noise-whitened readings
-are independent, so that any of them may be left out.
+every second load step, as its stiffness is its own; then the halves change places. Of a single
+specimen these halves tell of load steps alone. Noise-whitened readings are independent, so that any
+of them may be left out.
 """
 
 from collections.abc import Mapping, Sequence
