@@ -28,8 +28,7 @@ fit
 ax = sp.plot.curves(cohort, "flexion_extension", predicted=fit.predicted)
 
 # %% [markdown]
-# It is not. A quick search for what is missing, of one effect here; leave `effects` out to try
-# all of them.
+# It is not. What is missing? All effects are tried.
 
 # %%
 found = sp.find_missing_effects(cohort)

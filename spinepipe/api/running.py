@@ -1,12 +1,11 @@
 """A study run from Python as the command line runs it: what is up to date is not made again."""
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 from spinepipe.api.results import Results
 from spinepipe.api.study import Say
+from spinepipe.jobs.start import Snakemake
 from spinepipe.progress import silent
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import files_of
@@ -27,7 +26,7 @@ def run(
         ``config/studies/<study>.yaml`` in any project.
     cores : jobs at a time; all cores by default.
     force : make everything again, up to date or not.
-    say : told each line of Snakemake's, such as `print`.
+    say : told how far the run is, such as `print`.
 
     Raises
     ------
@@ -44,14 +43,14 @@ def run(
         places = (one for one in (here, *here.parents) if (one / "config").is_dir())
         root, path = next(places, here), Path(study)
     checked = studies.check(root, path.stem)
-    asked = [f"-j{cores or os.cpu_count()}", files_of(*checked).page()]
-    command = [sys.executable, "-m", "snakemake", *asked, *(["--forceall"] if force else [])]
-    lines: list[str] = []
-    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    with subprocess.Popen(command, cwd=root, text=True, **streams) as process:  # type: ignore[call-overload]
-        for line in process.stdout:
-            lines.append(line.rstrip())
-            say(lines[-1])
-    if process.returncode:
+    asked = [files_of(*checked).page(), "--cores", f"{cores or os.cpu_count()}"]
+    process, lines = Snakemake(root, [*asked, *["--forceall"] * force], path.stem), list[str]()
+    for event in process.events():
+        if event["event"] == "progress":
+            say(f"{event['done']} of {event['total']} jobs: {event['last']}")
+        elif "text" in event:
+            lines.append(event["text"])
+            say(event["text"])
+    if process.code:
         raise RuntimeError("\n".join([f"{path.stem}: a job failed", *lines[-TOLD_LINES:]]))
     return Results(root / "results" / path.stem)

@@ -51,6 +51,9 @@ SUSPICIOUS = re.compile(
 PROGRAMS = {
     "cli/archive.py": "git, for the commit of the code",
     "cli/doctor.py": "starts this very Python, to see whether the engine crashes",
+    "cli/slurm.py": "Slurm's own sinfo, scontrol and sacct, which say what a cluster allows",
+    "citing/cite.py": "git, for the commit of the code",
+    "jobs/start.py": "Snakemake, by this very Python",
     "jobs/if_changed.py": "starts the command that it is given, which is Snakemake",
 }
 """Files that start a program, and why."""
@@ -60,6 +63,8 @@ BY_NAME = {
     "effects/__init__.py": "every file of its own folder",
     "comparison/papers.py": "the engine in the folder beside the package",
     "studies/registry.py": "folders of kinds, by a name that is one of them, and what they declare",
+    "api/result.py": "the sentences of a kind, by the kind of a result",
+    "cohort/cohort.py": "its arrays for notebooks, which load xarray",
     "jobs/block.py": "the job of a kind that makes the files of a block",
     "jobs/pool.py": "jobs, by names that the rules write",
     "jobs/report.py": "the page of a kind",

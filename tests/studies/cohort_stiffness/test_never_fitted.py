@@ -110,7 +110,7 @@ def test_the_rest_of_the_house_reads_the_empty_rows(tmp_path: Path) -> None:
     assert "about (0, 10, 0) mm from its origin" in words
 
     fit = sp.calibrate(cohort, stiffness="per_joint", leave_out="specimen")
-    assert fit.headline.startswith("9 of 9 stiffnesses")
+    assert fit.table["stiffness"].notna().sum() == 9
     assert_empty(fit.table, [MOMENT_OF[BENT][2]])
     assert set(fit.stiffness["source"]) == {"own"}
     assert set(fit.predicted_stiffness["source"]) == {"others_median"}
