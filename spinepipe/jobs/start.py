@@ -100,6 +100,7 @@ class Snakemake:
             if self._process.poll() is None:  # who listened has gone
                 self._process.kill()
                 self._process.wait()
+            self._process.stdout.close()
 
 
 def _event(line: str) -> Event:
