@@ -99,9 +99,10 @@ def described(
     )
     chain = suggestion.vertebrae
     what = f"{count(len(suggestion.specimens), 'specimen')} {chain[-1]}-{chain[0]}"
+    tests = listed([one.replace("_", " ") for one in suggestion.tests])
     header = {
         "cohort": cohort,
-        "title": f"{what}, {count(len(suggestion.tests), 'test')}: {listed(suggestion.tests)}",
+        "title": f"{what}, {count(len(suggestion.tests), 'test')}: {tests}",
         "source": ask.ask("Source: who measured, when, how; licence", "not told"),
         "vertebrae": list(chain),
     }
