@@ -11,8 +11,7 @@ if TYPE_CHECKING:
     from spinepipe.api.cohorts import check, read_cohort
     from spinepipe.api.machine import import_machine
     from spinepipe.api.missing_effects import find_missing_effects
-    from spinepipe.api.results import compare, open_results
-    from spinepipe.api.running import run
+    from spinepipe.api.results import compare, open_results, run
     from spinepipe.api.sensitivity import sensitivity
     from spinepipe.api.simulation import simulate
     from spinepipe.api.stiffness import calibrate
@@ -44,7 +43,7 @@ _PLACES = {
     "import_machine": "spinepipe.api.machine",
     "open_results": "spinepipe.api.results",
     "read_cohort": "spinepipe.api.cohorts",
-    "run": "spinepipe.api.running",
+    "run": "spinepipe.api.results",
     "sensitivity": "spinepipe.api.sensitivity",
     "simulate": "spinepipe.api.simulation",
 }

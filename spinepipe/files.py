@@ -9,6 +9,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 
+CONFIG = Path("config") / "config.yaml"
+"""Which studies a plain run builds; where it lies a project begins."""
+
 HOST = re.sub(r"[^A-Za-z0-9]+", "-", platform.node()) or "here"
 """Name of this machine, as files that are gone with a process are called by it."""
 
@@ -53,6 +56,11 @@ def refusal(folder: Path) -> str:
 def cache_home() -> Path:
     """Where programs keep what they can make again, as Snakemake and Matplotlib look for it."""
     return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+
+
+def project_root(start: Path) -> Path:
+    """The nearest folder upwards with config/config.yaml; the start where there is none."""
+    return next((one for one in (start, *start.parents) if (one / CONFIG).is_file()), start)
 
 
 def cache_of_project(root: Path) -> Path:

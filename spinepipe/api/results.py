@@ -1,4 +1,4 @@
-"""Results of a study that a run wrote: its tables as data frames, and how two runs differ."""
+"""Results of a study that a run writes or wrote: tables as data frames, and how two runs differ."""
 
 import shutil
 from collections.abc import Collection, Iterator, Mapping
@@ -13,16 +13,24 @@ import xarray as xr
 
 from spinepipe.api.arrays import arrays
 from spinepipe.api.result import Shown, with_units
+from spinepipe.api.study import Say
+from spinepipe.files import project_root
 from spinepipe.jobs.expected import Expected
+from spinepipe.jobs.start import Snakemake, cores_here
 from spinepipe.marks import mark_in
+from spinepipe.progress import silent
 from spinepipe.report.conclusions import Told, read_back
 from spinepipe.schema import Table
 from spinepipe.studies.kind import Kind
-from spinepipe.studies.read import check
-from spinepipe.studies.registry import kind_of
+from spinepipe.studies.read import ENDING, check
+from spinepipe.studies.registry import files_of, kind_of
+from spinepipe.studies.study import STUDIES
 from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_frame, read_metadata
 from spinepipe.tidy.tables import tidied
+
+TOLD_LINES = 20
+"""Of what Snakemake said of a run that failed."""
 
 
 class Results(Shown, Mapping[str, pd.DataFrame]):
@@ -137,6 +145,45 @@ class Results(Shown, Mapping[str, pd.DataFrame]):
         root, name = self.path.absolute().parents[1], self.provenance["study"]
         expected = Expected(str(root), *check(root, name, starting=False))
         return [n for n in self if mark_in(self.files[n]) != expected.of_result(n)]
+
+
+def run(
+    study: str | Path, *, cores: int | None = None, force: bool = False, say: Say = silent
+) -> Results:
+    """Make the report of a study, and all that it needs, by Snakemake; jobs resume.
+
+    Parameters
+    ----------
+    study : name of a study of the project in or above the working folder, or its file
+        ``config/studies/<study>.yaml`` in any project.
+    cores : jobs at a time; all cores that this process may use by default.
+    force : make everything again, up to date or not.
+    say : told how far the run is, such as `print`.
+
+    Raises
+    ------
+    InputError
+        With all that is wrong with the study and its cohort.
+    RuntimeError
+        Where a job fails, with the last lines that were said.
+    """
+    path = Path(study).absolute()
+    if path.suffix == ENDING:
+        root = path.parents[len(STUDIES.parts)]
+    else:
+        root, path = project_root(Path.cwd()), Path(study)
+    checked = check(root, path.stem)
+    asked = [files_of(*checked).page(), "--cores", f"{cores or cores_here()}"]
+    process, lines = Snakemake(root, [*asked, *["--forceall"] * force], path.stem), list[str]()
+    for event in process.events():
+        if event["event"] == "progress":
+            say(f"{event['done']} of {event['total']} jobs: {event['last']}")
+        elif "text" in event:
+            lines.append(event["text"])
+            say(event["text"])
+    if process.code:
+        raise RuntimeError("\n".join([f"{path.stem}: a job failed", *lines[-TOLD_LINES:]]))
+    return Results(root / "results" / path.stem)
 
 
 def open_results(path: str | Path) -> Results:

@@ -4,18 +4,21 @@ import csv
 import json
 import subprocess
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
 
-import spinepipe
 from spinepipe.report.conclusions import Told
+
+_CODE = Path(__file__).resolve().parents[2]
+_CODE_PARTS = ("Snakefile", "spinepipe", "workflow", "papers", "profiles", "requirements.lock")
 
 _CSL = {"id": "id", "title": "title", "volume": "volume", "pages": "page", "doi": "DOI"}
 _CSL |= {"journal": "container-title"}
 _NOT_TOLD = ("id", "keyword")
 
 
-def methods(conclusions: Iterable[Told], made_by: str = spinepipe.__version__) -> str:
+def methods(conclusions: Iterable[Told], made_by: str) -> str:
     """A paragraph: what the page says of methods, and the version that computed it."""
     said = [one.text for one in conclusions if one.place == "methods"]
     return " ".join([*said, f"Computed with spinepipe {made_by}."])
@@ -53,9 +56,34 @@ def bibtex(entries: Sequence[Mapping[str, str]]) -> str:
 def versions(metadata: Mapping[str, str]) -> dict[str, str]:
     """What made a table, as its file says; of now the commit, where spinepipe runs from a clone."""
     found = {key.removeprefix("version_"): value for key, value in metadata.items()}
-    clone = Path(spinepipe.__file__).parents[1]
-    if (clone / ".git").exists():
-        asked = ["git", "-C", str(clone), "describe", "--always", "--dirty", "--exclude=*"]
-        done = subprocess.run(asked, capture_output=True, text=True, check=False)
-        found |= {"commit now": done.stdout.strip()} if done.returncode == 0 else {}
+    with suppress(CommitUnknown):
+        commit, changed = commit_of_code()
+        found["commit now"] = commit + "-dirty" * bool(changed)
     return found
+
+
+class CommitUnknown(Exception):
+    """Why the commit of the code is not known, in a sentence."""
+
+
+def commit_of_code() -> tuple[str, str]:
+    """The commit of the code that runs, and what of it was changed since, as git lists it.
+
+    Raises
+    ------
+    CommitUnknown
+        Where the code was not read from its own repository, or without git.
+    """
+
+    def git(*arguments: str) -> str:
+        command = ["git", "--no-optional-locks", "-C", str(_CODE), *arguments]
+        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.rstrip()
+
+    try:
+        if Path(git("rev-parse", "--show-toplevel")).resolve() != _CODE:
+            why = "The commit is not known: the code lies in the repository of something else."
+            raise CommitUnknown(why)
+        return git("rev-parse", "HEAD"), git("status", "--porcelain", "--", *_CODE_PARTS)
+    except (OSError, subprocess.CalledProcessError):
+        why = "The commit is not known: the code was not read from its repository, or without git."
+        raise CommitUnknown(why) from None

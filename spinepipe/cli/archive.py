@@ -5,7 +5,6 @@ same files give the same bytes: names are in order, and no date of a file is in 
 """
 
 import os
-import subprocess
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
@@ -15,6 +14,7 @@ from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 import typer
 
+from spinepipe.citing.cite import CommitUnknown, commit_of_code
 from spinepipe.cli.find import known_study
 from spinepipe.files import appearing, is_hidden
 from spinepipe.jobs.expected import Expected
@@ -33,8 +33,6 @@ from spinepipe.studies.study import STUDIES, Study
 from spinepipe.studies.tables import CONCLUSIONS
 from spinepipe.tables import read_metadata
 
-_CODE = Path(__file__).resolve().parents[2]
-_CODE_PARTS = ("Snakefile", "spinepipe", "workflow", "papers", "profiles", "requirements.lock")
 _NO_DATE = (1980, 1, 1, 0, 0, 0)
 """The first that a zip can tell."""
 
@@ -215,16 +213,8 @@ def _packages(study: Study) -> Iterator[str]:
 
 def _commit() -> str:
     """The commit of the code, and whether it was changed since; or why neither is known."""
-
-    def git(*arguments: str) -> str:
-        command = ["git", "--no-optional-locks", "-C", str(_CODE), *arguments]
-        return subprocess.run(command, check=True, capture_output=True, text=True).stdout.rstrip()
-
     try:
-        if Path(git("rev-parse", "--show-toplevel")).resolve() != _CODE:
-            return "The commit is not known: the code lies in the repository of something else."
-        changed = git("status", "--porcelain", "--", *_CODE_PARTS)
-        commit = git("rev-parse", "HEAD")
-    except (OSError, subprocess.CalledProcessError):
-        return "The commit is not known: the code was not read from its repository, or without git."
+        commit, changed = commit_of_code()
+    except CommitUnknown as why:
+        return str(why)
     return f"commit {commit}" + (f", with these changes:\n{changed}" if changed else ", unchanged")

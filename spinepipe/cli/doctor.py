@@ -1,6 +1,5 @@
-"""`spinepipe doctor`: can this computer run the studies? Only the standard library is needed."""
+"""`spinepipe doctor`: can this computer run the studies? Typer and the standard library suffice."""
 
-import os
 import platform
 import re
 import shlex
@@ -16,6 +15,7 @@ from typing import Annotated
 import typer
 
 from spinepipe.files import cache_home, cache_of_project, refusal
+from spinepipe.jobs.start import cores_here
 from spinepipe.reference.licences import pinned
 from spinepipe.shipped import IN_A_CLONE, SHIPPED
 
@@ -175,11 +175,3 @@ def check_cache(root: Path) -> str:
 def check_cores(root: Path) -> str:
     """How many cores a run takes."""
     return f"{cores_here()}; `spinepipe run` takes all of them, -j N takes N"
-
-
-def cores_here() -> int:
-    """Cores that this process may use."""
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # only Linux tells which cores a process may use
-        return os.cpu_count() or 1

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from spinepipe.cli.program import CONFIG, FINE, WrongUsage
-from spinepipe.files import appearing, refusal
+from spinepipe.cli.program import FINE, WrongUsage
+from spinepipe.files import CONFIG, appearing, refusal
 from spinepipe.shipped import SHIPPED
 
 DEMO = "l4l5_disc"
@@ -106,9 +106,8 @@ def _named(names: list[str]) -> str:
 def _run_demo(context: typer.Context, root: Path) -> int:
     """Compute the example; print what it says and where its report is."""
     # here: a folder without an example is made at once
-    from spinepipe.cli.doctor import cores_here
     from spinepipe.cli.run import Watched
-    from spinepipe.jobs.start import Snakemake
+    from spinepipe.jobs.start import Snakemake, cores_here
     from spinepipe.report.overview.stored import stored_conclusions
 
     print(f"Computing {DEMO}: about {DEMO_SECONDS} s", flush=True)

@@ -1,7 +1,7 @@
 """`spinepipe plan`: what a run will do, and how long that takes; nothing is computed."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,11 +9,10 @@ from typing import Annotated, Any
 import typer
 from snakemake_logger_plugin_spinepipe.time_left import duration, job_seconds
 
-from spinepipe.cli.doctor import cores_here
 from spinepipe.cli.find import known_study
 from spinepipe.cli.program import WrongUsage
 from spinepipe.jobs.expected import Expected
-from spinepipe.jobs.start import Snakemake
+from spinepipe.jobs.start import Snakemake, cores_here
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import kind_of
 
@@ -46,10 +45,11 @@ def command(
     jobs = planned(root, [one for one in chosen if one not in changed])
     searches = {f"{one.study.kind}_search" for one in changed}
     jobs += planned(root, changed, "--forcerun", *sorted(searches))
+    known = job_seconds(root)
     told = context.meta["data"] = []
     for one in chosen:
         name = one.study.study
-        parts = list(_parts(root, name, jobs, longer[name]))
+        parts = list(_parts(known, name, jobs, longer[name]))
         whole = sum(part["seconds"] for part in parts) / cores
         seconds = max([whole, *(part["seconds"] / part["jobs"] for part in parts)])
         how = MEASURED if all(part["time"] == MEASURED for part in parts) else ESTIMATED
@@ -134,10 +134,9 @@ def planned(root: Path, chosen: Sequence[Expected], *also: str) -> Counter[tuple
 
 
 def _parts(
-    root: Path, study: str, jobs: Counter[tuple[str, str]], longer: float
+    known: Mapping[str, float], study: str, jobs: Counter[tuple[str, str]], longer: float
 ) -> Iterator[dict[str, Any]]:
     """Jobs of a study by rule, with the time that they take together; its search ``longer``."""
-    known = job_seconds(root)
     for (of, rule), number in jobs.items():
         if of == study:
             own = known.get(f"{study}:{rule}")

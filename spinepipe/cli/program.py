@@ -26,8 +26,8 @@ from typer.exceptions import TyperException
 from typer.main import get_command
 
 import spinepipe
-from spinepipe.files import cache_home, cache_of_project, refusal
-from spinepipe.problems import nearest
+from spinepipe.files import cache_home, cache_of_project, project_root, refusal
+from spinepipe.problems import InputError, nearest
 
 COMMANDS = {
     "Start": {
@@ -47,7 +47,7 @@ COMMANDS = {
     },
     "Use": {
         "compare": "set two studies side by side",
-        "export": "write a specimen's model as an OpenSim file",
+        "export": "write tables as CSV, or a specimen's model as an OpenSim file",
         "cite": "give a paragraph of methods, references, versions",
         "archive": "pack a computed study as a zip, for the supplement of a paper",
     },
@@ -61,11 +61,12 @@ COMMANDS = {
 FINE, PROBLEM, USAGE, FAILED, STOPPED = 0, 1, 2, 3, 130
 """Exit codes: all well, a problem in the input, wrong usage, a job failed, stopped by Ctrl-C."""
 
-CONFIG = Path("config") / "config.yaml"
-
-OF_ALL = {"--json": "--json", "-q": "--quiet", "--quiet": "--quiet"} | {
-    "-v": "--verbose",
+OF_ALL = {
+    "--json": "--json",
+    "--quiet": "--quiet",
+    "-q": "--quiet",
     "--verbose": "--verbose",
+    "-v": "--verbose",
 }
 """Options of every command, which may stand behind its name too."""
 
@@ -151,8 +152,8 @@ def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., No
     def run(*args: Any, **given: Any) -> None:
         from spinepipe.marks import DamagedFile
         from spinepipe.model.spine import RefusedModel
-        from spinepipe.problems import InputError
 
+        mendable = (DamagedFile, InputError, RefusedModel, WrongUsage, OSError, ImportError)
         asked = given["context"].find_root().params
         said = io.StringIO()
         hidden = redirect_stdout(said) if asked["json"] or asked["quiet"] else nullcontext()
@@ -176,9 +177,7 @@ def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., No
             # what is still to be printed goes nowhere, or Python would complain at its end
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             code = FINE
-        except (
-            *(DamagedFile, InputError, RefusedModel, WrongUsage, OSError, ImportError),
-        ) as error:
+        except mendable as error:
             # these say what the user can mend; any other is a fault of ours, and is shown with its
             # traceback
             words = str(error)
@@ -205,11 +204,6 @@ def _version(given: bool) -> None:
         python = f"Python {platform.python_version()}, {platform.system()}"
         print(f"spinepipe {spinepipe.__version__} ({python})")
         raise typer.Exit()
-
-
-def project_root(start: Path) -> Path:
-    """The nearest folder upwards with config/config.yaml; the start where there is none."""
-    return next((one for one in (start, *start.parents) if (one / CONFIG).is_file()), start)
 
 
 _app = typer.Typer(

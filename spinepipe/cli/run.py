@@ -13,12 +13,12 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 from snakemake_logger_plugin_spinepipe.time_left import duration
 
-from spinepipe.cli.doctor import cores_here
 from spinepipe.cli.plan import Effort, checked, targets, with_effort
 from spinepipe.cli.program import FAILED, FINE, PROBLEM, STOPPED, WrongUsage
+from spinepipe.cli.slurm import SLURM, slurm_profile
 from spinepipe.files import appearing
 from spinepipe.jobs.expected import Expected
-from spinepipe.jobs.start import SLURM, Snakemake, slurm_profile
+from spinepipe.jobs.start import Snakemake, cores_here
 from spinepipe.report.overview.index import entry
 from spinepipe.report.words import count
 from spinepipe.studies import read as studies
@@ -62,7 +62,10 @@ def command(
     names, more = list(names or []), context.meta["rest"]
     wanted = [checked(root, name) for name in dict.fromkeys(names)] or stale(root)
     if not wanted:
-        print("All studies of config/config.yaml are up to date.\nNext: spinepipe index")
+        if studies.read_selection(root).studies:
+            print("All studies of config/config.yaml are up to date.\nNext: spinepipe index")
+        else:
+            print("config/config.yaml names no study yet.\nNext: spinepipe new study NAME")
         return FINE
     if {"-n", "--dry-run", "--dryrun"} & set(more):
         raise WrongUsage("a run that computes nothing", "spinepipe plan  says what it would do")
@@ -82,7 +85,7 @@ def command(
     arguments += ["--verbose"] * asked["verbose"]
     begun = time.monotonic()
     one = wanted[0].study.study if len(wanted) == 1 else ""
-    run = Snakemake(root, arguments, one, None if slurm else 3.0)
+    run = Snakemake(root, arguments, one, submits=slurm)
     watched = Watched(run, asked["quiet"] or asked["json"], asked["verbose"])
     code = watched.watch()
     if code != FINE:

@@ -1,9 +1,9 @@
-"""Whether a run on Slurm will go: asked of the cluster, before anything is submitted."""
+"""Runs on Slurm: the profile with what a run adds, and whether the cluster will take it."""
 
 import re
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,21 @@ from typing import Any
 import yaml
 
 from spinepipe.cli.doctor import Trouble
-from spinepipe.jobs.start import SLURM
+from spinepipe.files import appearing
+
+SLURM = Path("profiles") / "slurm" / "config.yaml"
+
+ADDED_TO = Path(".snakemake") / "spinepipe-slurm" / "config.yaml"
+"""The profile for Slurm with what a run adds to its lists."""
+
+LISTS = (
+    "--set-resources",
+    "--set-threads",
+    "--default-resources",
+    "--groups",
+    "--group-components",
+)
+"""Options of Snakemake that replace the whole list of a profile; ``rule:resource=value``."""
 
 SECONDS = 60
 """That the queue has for an answer."""
@@ -107,3 +121,47 @@ def minutes_of(profile: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
     for rule, resources in {**of_others, **(profile.get("set-resources") or {})}.items():
         if found := re.match(r"\d+", str(resources.get("runtime", ""))):
             yield rule, int(found[0])
+
+
+def slurm_profile(root: Path, arguments: Sequence[str], also: Sequence[str]) -> list[str]:
+    """Write the profile for Slurm with what is added to its lists; arguments of Snakemake with it.
+
+    Snakemake itself would put what is typed in the place of a whole list.
+
+    Parameters
+    ----------
+    arguments : for Snakemake. also : default resources, ``slurm_account=name``.
+
+    Raises
+    ------
+    FileNotFoundError
+        Where the project has no profile for Slurm.
+    """
+    profile = yaml.safe_load((root / SLURM).read_text("utf-8"))
+    rest: list[str] = []
+    added: list[tuple[str, str]] = [("--default-resources", one) for one in also]
+    option = ""
+    for one in arguments:
+        name, _, value = one.partition("=")
+        if one.startswith("-"):
+            option = name if name in LISTS else ""
+            added += [(option, value)] if option and value else []
+            rest += [] if option else [one]
+        elif option:
+            added.append((option, one))
+        else:
+            rest.append(one)
+    for option, one in added:
+        key, _, value = one.partition("=")
+        place = profile.setdefault(option.removeprefix("--"), {})
+        if isinstance(place, list):  # the other form in which a profile may have it
+            place.append(one)
+        elif ":" in key:
+            rule, _, resource = key.partition(":")
+            place.setdefault(rule, {})[resource] = yaml.safe_load(value)
+        else:
+            place[key] = yaml.safe_load(value)
+    (root / ADDED_TO).parent.mkdir(parents=True, exist_ok=True)
+    with appearing(root / ADDED_TO) as temporary:
+        temporary.write_text(yaml.safe_dump(profile, sort_keys=False), "utf-8")
+    return [*rest, "--profile", str(ADDED_TO.parent)]

@@ -14,20 +14,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
+from spinepipe.files import cache_home, cache_of_project, refusal
 
-from spinepipe.files import appearing, cache_home, cache_of_project, refusal
-
-SLURM = Path("profiles") / "slurm" / "config.yaml"
-
-ADDED_TO = Path(".snakemake") / "spinepipe-slurm" / "config.yaml"
-"""The profile for Slurm with what a run adds to its lists."""
-
-LISTS = (
-    *("--set-resources", "--default-resources", "--groups", "--group-components"),
-    "--set-threads",
-)
-"""Options of Snakemake that replace the whole list of a profile; ``rule:resource=value``."""
+GRACE_S = 3.0
+"""After which Snakemake is killed when it was stopped: it would wait for the jobs that are at work,
+and half files are never kept.
+"""
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
@@ -45,17 +37,17 @@ class Snakemake:
     """
 
     def __init__(
-        self, root: Path, arguments: Sequence[str], study: str = "", grace_s: float | None = 3.0
+        self, root: Path, arguments: Sequence[str], study: str = "", submits: bool = False
     ) -> None:
         """Start it.
 
         Parameters
         ----------
         study : the one that is run, if it is one: its jobs of earlier runs tell the time.
-        grace_s : after which it is killed when it was stopped; None where it has submitted jobs to
-            cancel. It would wait for the jobs that are at work, and half files are never kept.
+        submits : whether its jobs are on a cluster: then it has those to cancel when it is stopped,
+            and is not killed.
         """
-        self.code, self._grace_s = 0, grace_s
+        self.code, self._submits = 0, submits
         environment = {**os.environ, "PYTHONUTF8": "1", "SPINEPIPE_EVENTS": study}
         if refusal(cache_home() / "snakemake"):
             environment["XDG_CACHE_HOME"] = str(cache_of_project(root))
@@ -82,8 +74,8 @@ class Snakemake:
                 self._process.kill()
             elif self._process.poll() is None:
                 self._process.send_signal(signal.SIGINT)
-                if self._grace_s is not None:
-                    kill = threading.Timer(self._grace_s, self._process.kill)
+                if not self._submits:
+                    kill = threading.Timer(GRACE_S, self._process.kill)
                     kill.daemon = True
                     kill.start()
             self.code = -signal.SIGINT
@@ -110,45 +102,9 @@ def _event(line: str) -> Event:
     return {"event": "text", "text": line}
 
 
-def slurm_profile(root: Path, arguments: Sequence[str], also: Sequence[str]) -> list[str]:
-    """Write the profile for Slurm with what is added to its lists; arguments of Snakemake with it.
-
-    Snakemake itself would put what is typed in the place of a whole list.
-
-    Parameters
-    ----------
-    arguments : for Snakemake. also : default resources, ``slurm_account=name``.
-
-    Raises
-    ------
-    FileNotFoundError
-        Where the project has no profile for Slurm.
-    """
-    profile = yaml.safe_load((root / SLURM).read_text("utf-8"))
-    rest: list[str] = []
-    added: list[tuple[str, str]] = [("--default-resources", one) for one in also]
-    option = ""
-    for one in arguments:
-        name, _, value = one.partition("=")
-        if one.startswith("-"):
-            option = name if name in LISTS else ""
-            added += [(option, value)] if option and value else []
-            rest += [] if option else [one]
-        elif option:
-            added.append((option, one))
-        else:
-            rest.append(one)
-    for option, one in added:
-        key, _, value = one.partition("=")
-        place = profile.setdefault(option.removeprefix("--"), {})
-        if isinstance(place, list):  # the other form in which a profile may have it
-            place.append(one)
-        elif ":" in key:
-            rule, _, resource = key.partition(":")
-            place.setdefault(rule, {})[resource] = yaml.safe_load(value)
-        else:
-            place[key] = yaml.safe_load(value)
-    (root / ADDED_TO).parent.mkdir(parents=True, exist_ok=True)
-    with appearing(root / ADDED_TO) as temporary:
-        temporary.write_text(yaml.safe_dump(profile, sort_keys=False), "utf-8")
-    return [*rest, "--profile", str(ADDED_TO.parent)]
+def cores_here() -> int:
+    """Cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # only Linux tells which cores a process may use
+        return os.cpu_count() or 1

@@ -15,7 +15,7 @@ from spinepipe.documents.form import TableForm
 from spinepipe.documents.names import COHORT_NAME
 from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument, read_yaml
-from spinepipe.files import files_in, folders_in, strays_in
+from spinepipe.files import CONFIG, files_in, folders_in, strays_in
 from spinepipe.problems import InputError, InputProblem, Spelling, closest, did_you_mean, one_of
 from spinepipe.studies.kind import Kind
 from spinepipe.studies.parts import FORM
@@ -222,8 +222,6 @@ def _kind(document: YamlDocument) -> Kind | None:
     name = document.data.get("kind")
     return kind_of(name) if isinstance(name, str) and name in kind_names() else None
 
-
-CONFIG = Path("config") / "config.yaml"
 
 _Names = Annotated[tuple[str, ...], Field(strict=False)]
 

@@ -35,6 +35,8 @@ def test_a_new_project(
     assert {path.name for path in root.iterdir()} == {"Snakefile", "config", "profiles", "results"}
     assert len((root / "Snakefile").read_text().splitlines()) == 2
     assert read_selection(root).studies == ()
+    assert main(["--root", str(root), "run"]) == 0
+    assert capsys.readouterr().out.startswith("config/config.yaml names no study yet.")
 
 
 def test_nothing_of_somebody_is_written_over(

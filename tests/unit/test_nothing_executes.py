@@ -49,7 +49,6 @@ SUSPICIOUS = re.compile(
 """Words without which a file need not be looked at closely."""
 
 PROGRAMS = {
-    "cli/archive.py": "git, for the commit of the code",
     "cli/doctor.py": "starts this very Python, to see whether the engine crashes",
     "cli/slurm.py": "Slurm's own sinfo, scontrol and sacct, which say what a cluster allows",
     "citing/cite.py": "git, for the commit of the code",

@@ -22,7 +22,7 @@ from spinepipe.tidy.tables import write_tidy
 ROOT = Path(__file__).parents[2]
 mpl.use("Agg")
 MODULES = (
-    *("arrays", "cohorts", "machine", "missing_effects", "results", "running"),
+    *("arrays", "cohorts", "machine", "missing_effects", "results"),
     *("sensitivity", "simulation", "stiffness"),
 )
 

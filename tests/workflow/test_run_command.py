@@ -18,7 +18,7 @@ import yaml
 from small_project import Project
 from toy import STUDY
 
-from spinepipe.jobs.start import ADDED_TO, slurm_profile
+from spinepipe.cli.slurm import ADDED_TO, slurm_profile
 
 pytestmark = pytest.mark.slow
 
