@@ -1,5 +1,6 @@
 """What a name on the command line means: a study, a cohort, or the folder of one."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -66,6 +67,20 @@ def unknown(what: str, name: str, known: Sequence[str]) -> WrongUsage:
     remedy = f"did you mean {' or '.join(near)}?" if near else listed
     otherwise = "spinepipe check lists all; another folder is named by --root"
     return WrongUsage(f'there is no {what} "{name}"', remedy or otherwise)
+
+
+def vertebrae_of(text: str) -> tuple[str, ...]:
+    """Vertebrae as they are typed, from the lowest.
+
+    Raises
+    ------
+    WrongUsage
+        When there are fewer than two, between which there is no joint.
+    """
+    names = tuple(re.split(r"[\s,]+", text.strip()))
+    if len(names) < 2:
+        raise WrongUsage(f'the vertebrae "{text}"', 'name at least two, as in "L5 L4"')
+    return names
 
 
 def specimen_of(cohort: Cohort, name: str | None) -> str:
