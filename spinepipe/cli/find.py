@@ -13,6 +13,9 @@ from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS, STUDIES, Study
 
+ALL = "spinepipe check lists all; another folder is named by --root"
+"""What to do about a study or cohort that there is not."""
+
 MOST_NAMED = 5
 """Known names that are listed where none is near."""
 
@@ -59,13 +62,17 @@ def known_study(name: str, root: Path) -> str:
     return name
 
 
-def unknown(what: str, name: str, known: Sequence[str]) -> WrongUsage:
-    """A name on the command line that nothing has, with the nearest three that there are."""
+def unknown(what: str, name: str, known: Sequence[str], otherwise: str = ALL) -> WrongUsage:
+    """A name on the command line that nothing has, with the nearest three that there are.
+
+    Parameters
+    ----------
+    otherwise : what to do where none is near and there are too many to be listed.
+    """
     known = list(dict.fromkeys(known))  # a study and its cohort may be called alike
     near = nearest(name, known)
     listed = f"they are {', '.join(known)}" if 0 < len(known) <= MOST_NAMED else ""
     remedy = f"did you mean {' or '.join(near)}?" if near else listed
-    otherwise = "spinepipe check lists all; another folder is named by --root"
     return WrongUsage(f'there is no {what} "{name}"', remedy or otherwise)
 
 
@@ -94,5 +101,6 @@ def specimen_of(cohort: Cohort, name: str | None) -> str:
     if name is None:
         return str(cohort.specimen_names[0])
     if name not in cohort.specimen_names:
-        raise unknown("specimen", name, cohort.specimen_names)
+        remedy = f"specimens.csv of {cohort.name} lists all"
+        raise unknown("specimen", name, cohort.specimen_names, remedy)
     return name
