@@ -1,5 +1,6 @@
 """What a name on the command line means: a study, a cohort, or the folder of one."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,6 +12,9 @@ from spinepipe.problems import nearest
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form
 from spinepipe.studies.study import COHORTS, STUDIES, Study
+
+ALL = "spinepipe check lists all; another folder is named by --root"
+"""What to do about a study or cohort that there is not."""
 
 MOST_NAMED = 5
 """Known names that are listed where none is near."""
@@ -58,14 +62,32 @@ def known_study(name: str, root: Path) -> str:
     return name
 
 
-def unknown(what: str, name: str, known: Sequence[str]) -> WrongUsage:
-    """A name on the command line that nothing has, with the nearest three that there are."""
+def unknown(what: str, name: str, known: Sequence[str], otherwise: str = ALL) -> WrongUsage:
+    """A name on the command line that nothing has, with the nearest three that there are.
+
+    Parameters
+    ----------
+    otherwise : what to do where none is near and there are too many to be listed.
+    """
     known = list(dict.fromkeys(known))  # a study and its cohort may be called alike
     near = nearest(name, known)
     listed = f"they are {', '.join(known)}" if 0 < len(known) <= MOST_NAMED else ""
     remedy = f"did you mean {' or '.join(near)}?" if near else listed
-    otherwise = "spinepipe check lists all; another folder is named by --root"
     return WrongUsage(f'there is no {what} "{name}"', remedy or otherwise)
+
+
+def vertebrae_of(text: str) -> tuple[str, ...]:
+    """Vertebrae as they are typed, from the lowest.
+
+    Raises
+    ------
+    WrongUsage
+        When there are fewer than two, between which there is no joint.
+    """
+    names = tuple(re.split(r"[\s,]+", text.strip()))
+    if len(names) < 2:
+        raise WrongUsage(f'the vertebrae "{text}"', 'name at least two, as in "L5 L4"')
+    return names
 
 
 def specimen_of(cohort: Cohort, name: str | None) -> str:
@@ -79,5 +101,6 @@ def specimen_of(cohort: Cohort, name: str | None) -> str:
     if name is None:
         return str(cohort.specimen_names[0])
     if name not in cohort.specimen_names:
-        raise unknown("specimen", name, cohort.specimen_names)
+        remedy = f"specimens.csv of {cohort.name} lists all"
+        raise unknown("specimen", name, cohort.specimen_names, remedy)
     return name

@@ -4,7 +4,7 @@ import os
 import re
 import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,23 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from spinepipe.cli.find import vertebrae_of
 from spinepipe.cohort.cohort import joint_names
+from spinepipe.documents.text import NUMBER
 from spinepipe.documents.yaml_text import YamlDocument, yaml_of_text
 from spinepipe.problems import InputError, InputProblem, one_of
 from spinepipe.report.words import count, listed
 from spinepipe.testing_machine.channels import DIRECTIONS
 from spinepipe.testing_machine.folder import read
+from spinepipe.testing_machine.settings import FileForm
 from spinepipe.testing_machine.sniff import seen, unit_of
-from spinepipe.testing_machine.suggest import ANSWERS, Suggestion, likely_unit, suggested
+from spinepipe.testing_machine.suggest import (
+    ANSWERS,
+    KINDS_OF_UNITS,
+    Suggestion,
+    likely_unit,
+    suggested,
+)
 
 SETTINGS = "import.yaml"
 
@@ -32,14 +41,8 @@ USUAL_DEG = 0.1
 NO_NAMES = ("raw", "data", "csv", "files", "export")
 """Names of folders that say nothing about a cohort."""
 
-UNITS_OF = {
-    "time": "s, ms, min",
-    "moment": "N m, N mm, N cm",
-    "angle": "deg, rad",
-    "force": "N, kN",
-}
-
 TURNS = tuple(word for word, way in DIRECTIONS.items() if way.turns)
+PUSHES = tuple(word for word, way in DIRECTIONS.items() if not way.turns)
 
 
 class Questions:
@@ -51,6 +54,25 @@ class Questions:
     def ask(self, text: str, suggestion: Any, **how: Any) -> Any:
         """The answer; the suggestion where it is just accepted."""
         return suggestion if self.yes else typer.prompt(text, default=suggestion, **how)
+
+    def choose(
+        self,
+        text: str,
+        suggestion: str,
+        allowed: Sequence[str],
+        meant: Callable[[str], str] = str,
+    ) -> str:
+        """As `ask`, again until it is one of those allowed; a suggestion that is taken may be none.
+
+        Parameters
+        ----------
+        meant : our word for what is typed.
+        """
+        while (answer := meant(self.ask(text, suggestion or None) or "")) not in allowed:
+            if self.yes:
+                break
+            print(f"Allowed: {', '.join(allowed)}.")
+        return answer
 
 
 def described(
@@ -89,7 +111,7 @@ def described(
     if vertebrae is None:
         shown = " ".join(suggestion.vertebrae)
         vertebrae = ask.ask("Which vertebrae, from the lowest, which is held?", shown)
-    suggestion = replace(suggestion, vertebrae=tuple(re.split(r"[\s,]+", vertebrae.strip())))
+    suggestion = replace(suggestion, vertebrae=vertebrae_of(vertebrae))
     _joints(suggestion, ask)
     own = next(
         (n for n in (folder.name, folder.parent.name) if n.lower() not in NO_NAMES), "my_lab"
@@ -106,15 +128,16 @@ def described(
         "source": ask.ask("Source: who measured, when, how; licence", "not told"),
         "vertebrae": list(chain),
     }
-    for point in suggestion.load_points_mm.values():
-        header["load_point_mm"] = list(point)
-    kept, _ = _cycles(folder, suggestion.settings(header, 0))
+    if suggestion.load_point_mm:
+        header["load_point_mm"] = suggestion.load_point_mm
+    kept, repeats = _cycles(folder, suggestion.settings(header, 0))
     first = int(kept > 2)
     if kept > 2 and not ask.yes:
         text = f"Cycles: {kept} in each file. Leave out the first as preconditioning?"
         first = int(typer.confirm(text, default=True))
     if accuracy_deg is None:
-        _, repeats = _cycles(folder, suggestion.settings(header, first))
+        if first and not ask.yes:  # else they are those, or nobody is asked
+            _, repeats = _cycles(folder, suggestion.settings(header, first))
         told = (
             ""
             if np.isnan(repeats)
@@ -151,16 +174,14 @@ def _cycles(folder: Path, text: str) -> tuple[int, float]:
 
 
 def _print_files(of: Suggestion) -> None:
-    form = of.files[0].form
-    alike = "" if all(one.form == form for one in of.files) else " (the first; others differ)"
-    first = form.get("first_line") or int(str(form.get("names_line", 1))) + 1
-    names = (
-        f"names in line {form.get('names_line', 1)}" if form.get("names_line", 1) else "no names"
-    )
-    how = f"separated by {form.get('delimiter', 'comma')}s, decimal {form.get('decimal', 'point')}"
+    alike = all(one.form == of.files[0].form for one in of.files)
+    form = FileForm.model_validate(of.files[0].form)
+    names = f"names in line {form.names_line}" if form.names_line else "no names"
+    how = f"separated by {form.delimiter}s, decimal {form.decimal}"
     if of.files[0].name.endswith(".xlsx"):
         how = "workbooks"
-    names += f", numbers from line {first}{alike}"
+    names += f", numbers from line {form.first_line or form.names_line + 1}"
+    names += "" if alike else " (the first; others differ)"
     of_what = (("specimen", of.specimens), ("test", of.tests))
     there = [f"{count(len(every), what)} ({listed(every)})" for what, every in of_what]
     print(f"{count(len(of.files), 'file')}, {', '.join(there)}; {how}, {names}.")
@@ -179,23 +200,26 @@ def _columns(of: Suggestion, ask: Questions) -> None:
             print(f"A number from 1 to {len(columns)}.")
             continue
         key = list(columns)[int(answer) - 1]
-        what = ""
-        while what not in ANSWERS:
-            what = ask.ask(f"{key} is ({', '.join(ANSWERS)})", of.taken[key][0])
+        what = ask.choose(f"{key} is ({', '.join(ANSWERS)})", of.taken[key][0], ANSWERS)
         unit = ""
         if what != "no":
             size = max(float(np.nanmax(np.abs(one.values))) for one in columns[key])
             clock = columns[key][0].clock
-            said = next((one.unit for one in columns[key] if one.unit), "")
-            said = said if said in UNITS_OF[what] else ""
-            unit = said or likely_unit(what, size, clock)
-            given = ask.ask(f"Unit ({UNITS_OF[what]})", unit) if not clock else unit
-            unit = unit_of(given) or given
+            told = (one.unit for one in columns[key] if KINDS_OF_UNITS.get(one.unit) == what)
+            unit = next(told, "") or likely_unit(what, size, clock)
+            if not clock:
+                kinds = KINDS_OF_UNITS.items()
+                units = [one for one, kind in kinds if kind == what and one != "clock"]
+                text = f"Unit ({', '.join(units)})"
+                unit = ask.choose(text, unit, units, lambda given: unit_of(given) or given)
         of.taken[key] = what, unit
         if what == "force":
-            of.force_towards[key] = ask.ask("A positive number pushes to", "inferior")
-            point = ask.ask("Where it acts, mm anterior, superior, right of the joint", "0 0 0")
-            of.load_points_mm[key] = tuple(float(one) for one in point.split())
+            of.force_towards[key] = ask.choose("A positive number pushes to", "inferior", PUSHES)
+            text = "Where forces act, mm anterior, superior, right of the joint"
+            point: list[str] = []
+            while len(point) != 3 or not all(map(NUMBER.fullmatch, point)):
+                point = ask.ask(text, "0 0 0").split()
+            of.load_point_mm[:] = map(float, point)
 
 
 def _print_columns(of: Suggestion) -> None:
@@ -227,9 +251,7 @@ def _directions(of: Suggestion, ask: Questions) -> None:
     """Ask where moments turn, and refuse what lacks a moment, an angle or a direction."""
     for test in of.tests:
         text = f"A positive moment in {test} turns the upper vertebra towards"
-        way = of.towards.get(test, "")
-        while not ask.yes and (way := ask.ask(text, way or None)) not in TURNS:
-            print(f"Allowed: {', '.join(TURNS)}.")
+        way = ask.choose(text, of.towards.get(test, ""), TURNS)
         if way not in TURNS:
             remedy = (
                 "name the test FE, LB or AR in the files' names or by --pattern, or leave out --yes"

@@ -12,11 +12,12 @@ import typer
 import yaml
 
 from spinepipe import cohort as cohorts
-from spinepipe.cli.find import cohort_names, study_names, unknown
+from spinepipe.cli.find import cohort_names, study_names, unknown, vertebrae_of
 from spinepipe.cli.program import WrongUsage
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.cohort.columns import TABLES
+from spinepipe.documents.names import COHORT_NAME
 from spinepipe.files import appearing
 from spinepipe.imports.imported import csv_text
 from spinepipe.problems import InputError, InputProblem, one_of
@@ -24,14 +25,13 @@ from spinepipe.report.words import count, listed
 from spinepipe.studies import read as studies
 from spinepipe.studies.registry import every_form, every_kind, function_at, kind_of
 from spinepipe.studies.study import COHORTS, STUDIES
-from spinepipe.testing_machine.channels import DIRECTIONS
-from spinepipe.testing_machine.folder import LEVEL_APART_MM
+from spinepipe.testing_machine.channels import DIRECTIONS, LOAD_COLUMNS
+from spinepipe.testing_machine.folder import template_of_joints
 from spinepipe.testing_machine.suggest import direction_of
 
 SCHEMAS = Path("config") / "schemas"
 STEPS_PER_SIDE = 5
 
-NAME = re.compile("[a-z0-9_]+")
 TEST = re.compile(r"(?P<test>\w+):(?P<peak>\d+(\.\d+)?)(x(?P<cycles>\d+))?")
 
 
@@ -84,10 +84,13 @@ def command(
 ) -> int:
     """Write a commented study or cohort to fill in."""
     root: Path = context.obj
-    if not NAME.fullmatch(name):
+    if not COHORT_NAME.fullmatch(name):  # studies have the same
         raise WrongUsage(f'the name "{name}"', "take a-z, 0-9 and _ alone")
     if what is What.cohort:
         return _cohort(root, name, vertebrae, tests)
+    sizes = misfit or [0.5, 0.2]
+    if min(sizes) <= 0.0:
+        raise WrongUsage(f"--misfit {min(sizes):g}", "sizes are above 0")
     path = root / STUDIES / f"{name}.yaml"
     if not (design and path.is_file()):
         if name in study_names(root):
@@ -98,19 +101,18 @@ def command(
         if (cohort := cohort or there[0]) not in there:
             raise unknown("cohort", cohort, there)
         read = cohorts.read(root / COHORTS / cohort, every_form())
-        able = [one for one, known in every_kind().items() if known.before_data]
         if kind is None:
-            kind = able[0] if design else _chosen(read, name, yes)
+            kind = _able_before_data()[0] if design else _chosen(read, name, yes)
         elif kind not in every_kind():
-            raise unknown("kind", kind, list(every_kind()))
+            remedy = "leave --kind out: what the cohort can answer is then said"
+            raise unknown("kind", kind, list(every_kind()), remedy)
+        if design:
+            _place_before_data(kind)
         _write_study(root, path, kind, cohort)
         if not design:
             print(f"Wrote {STUDIES / path.name}.")
             print(f"Next: spinepipe plan {name}")
             return 0
-    sizes = misfit or [0.5, 0.2]
-    if min(sizes) <= 0.0:
-        raise WrongUsage(f"--misfit {min(sizes):g}", "sizes are above 0")
     return _before_data(root, name, cycles, sizes, to or Path(f"{name}.csv"))
 
 
@@ -165,13 +167,29 @@ def _write_study(root: Path, path: Path, kind: str, cohort: str) -> None:
             temporary.write_text(content, encoding="utf-8")
 
 
+def _able_before_data() -> list[str]:
+    """Kinds that say something before there are data."""
+    return [name for name, known in every_kind().items() if known.before_data]
+
+
+def _place_before_data(kind: str) -> str:
+    """Where a kind has what it says before there are data.
+
+    Raises
+    ------
+    WrongUsage
+        Where it says nothing then.
+    """
+    if (place := kind_of(kind).before_data) is None:
+        able = listed(_able_before_data())
+        raise WrongUsage(f"--design of a study of kind {kind}", f"--kind {able}")
+    return place
+
+
 def _before_data(root: Path, name: str, cycles: int, sizes: Sequence[float], to: Path) -> int:
     """Say which effects planned tests could name, and write all of it as a table."""
     study = studies.read(root / STUDIES / f"{name}.yaml", root)
-    place = kind_of(study.kind).before_data
-    if place is None:
-        able = [one for one, known in every_kind().items() if known.before_data]
-        raise WrongUsage(f"--design of a study of kind {study.kind}", f"--kind {listed(able)}")
+    place = _place_before_data(study.kind)
     cohort = cohorts.read(study.cohort_folder(root))
     said = function_at(study.kind, place)
     for line in said(study, cohort, root, cycles, sizes, to):
@@ -186,14 +204,14 @@ def _cohort(root: Path, name: str, vertebrae: str | None, tests: str | None) -> 
     folder = root / COHORTS / name
     if folder.exists():
         raise WrongUsage(f"{COHORTS / name} is there", "take another name")
-    chain = re.split(r"[\s,]+", (vertebrae or typer.prompt("Vertebrae, from the lowest", "L5 L4")))
+    chain = vertebrae_of(vertebrae or typer.prompt("Vertebrae, from the lowest", "L5 L4"))
     asked = tests or typer.prompt("Tests", default="flexion_extension:7.5x3")
     found = [TEST.fullmatch(one) for one in asked.split()]
     if not all(found) or not all(direction_of(one["test"]) for one in found if one):
         remedy = 'as in "flexion_extension:7.5x3 lateral_bending:7.5x3 axial_rotation:7.5x3"'
         raise WrongUsage(f'--tests "{asked}"', remedy)
     told = [(one["test"], float(one["peak"]), int(one["cycles"] or 3)) for one in found if one]
-    joints = joint_names(tuple(chain))
+    joints = joint_names(chain)
     motion = [
         ("s01", test, cycle, step, joint, *[""] * 6)
         for test, peak, cycles in told
@@ -201,20 +219,23 @@ def _cohort(root: Path, name: str, vertebrae: str | None, tests: str | None) -> 
         for step, _ in enumerate(_moments(peak))
         for joint in joints
     ]
-    key, columns = ("specimen", "test"), TABLES["loads"].names[5:11]
     loads = [
-        ("*", test, step, chain[-1], *(way.sign * m + 0.0 if c == way.load else 0 for c in columns))
+        (
+            "*",
+            test,
+            step,
+            chain[-1],
+            *(way.sign * m + 0.0 if c == way.load else 0 for c in LOAD_COLUMNS),
+        )
         for test, peak, _ in told
         for way in (DIRECTIONS[direction_of(test)],)
         for step, m in enumerate(_moments(peak))
     ]
     rows: dict[str, list[Sequence[object]]] = {
         "specimens.csv": [("specimen",), ("s01",)],
-        "joints.csv": [
-            TABLES["joints"].names,
-            *(("s01", one, 0, n * LEVEL_APART_MM, 0, 0, 0, 0) for n, one in enumerate(joints)),
-        ],
-        "loads.csv": [(*key, "step", "vertebra", *columns), *loads],  # alike in every cycle
+        "joints.csv": [TABLES["joints"].names, *template_of_joints(["s01"], joints)],
+        # alike in every cycle
+        "loads.csv": [("specimen", "test", "step", "vertebra", *LOAD_COLUMNS), *loads],
         "motion_to_fill.csv": [TABLES["motion"].names, *motion],
     }
     header = f"""# All keys: docs/cohort-format.md

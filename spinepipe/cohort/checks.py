@@ -60,7 +60,7 @@ def _chain_problems(document: YamlDocument, names: list[str], count: int) -> Ite
         if times > 1:
             yield InputProblem(*place, f"'{name}' twice", "each vertebra once", "delete one")
     for lower, upper in pairwise(names):
-        low, high = _height(lower), _height(upper)
+        low, high = height(lower), height(upper)
         if low is not None and high is not None and low > high:
             found = f"'{lower}' before '{upper}'"
             yield InputProblem(
@@ -68,7 +68,7 @@ def _chain_problems(document: YamlDocument, names: list[str], count: int) -> Ite
             )
 
 
-def _height(name: str) -> tuple[int, int] | None:
+def height(name: str) -> tuple[int, int] | None:
     """Sort key of an anatomical name, growing cranially; None for other names."""
     match = re.fullmatch(r"([SLTC])([0-9]{1,3})", name)
     return (REGIONS.index(match[1]), -int(match[2])) if match else None

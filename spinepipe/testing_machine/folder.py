@@ -136,7 +136,7 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
     tests = read(folder, document)
     tables: dict[str, Rows] = {
         "specimens": [(name,) for name in _specimens(tests)],
-        "joints": _joints(tests),
+        "joints": template_of_joints(_specimens(tests), joint_names(tests.mapping.vertebrae)),
         "loads": _loads(tests),
         "motion": _motion(tests),
     }
@@ -265,12 +265,11 @@ def _specimens(tests: ImportedTests) -> list[str]:
     return list(dict.fromkeys(test.specimen for test in tests.tests))
 
 
-def _joints(tests: ImportedTests) -> Rows:
-    """A template: joints above each other, axes of ground."""
-    joints = joint_names(tests.mapping.vertebrae)
+def template_of_joints(specimens: Sequence[str], joints: Sequence[str]) -> Rows:
+    """Rows of joints.csv to put places into: joints above each other, axes of ground."""
     return [
         (specimen, joint, 0, f"{number * LEVEL_APART_MM:g}", 0, 0, 0, 0)
-        for specimen in _specimens(tests)
+        for specimen in specimens
         for number, joint in enumerate(joints)
     ]
 

@@ -64,6 +64,11 @@ NOTATIONS = tuple(
 )
 
 
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number in any notation."""
+    return any(one.pattern.fullmatch(cell) for one in NOTATIONS)
+
+
 def notations_of(cells: Iterable[str]) -> tuple[Notation, ...]:
     """Notations that read every cell that is a number in any; without thousands where that does."""
     able = set(NOTATIONS)
@@ -112,9 +117,8 @@ def remedy(cell: str, now: Notation, able: Sequence[Notation], time_unit: str) -
     time_unit : of the column of time, empty for others.
     """
     if time_unit == "clock":
-        is_number = any(one.pattern.fullmatch(cell) for one in NOTATIONS)
         to_unit = f"set its `unit` to s, ms or min; where they are days since 1900, {AS_TIME}"
-        return to_unit if is_number else f"let the machine write {CLOCK}"
+        return to_unit if is_number(cell) else f"let the machine write {CLOCK}"
     if now.pattern.fullmatch(cell):
         return "correct it: no measured number is that large"
     if time_unit and not np.isnan(clock_seconds(cell)):
@@ -126,7 +130,7 @@ def remedy(cell: str, now: Notation, able: Sequence[Notation], time_unit: str) -
         return f"it can be read in two ways: set {words}"
     if offered:
         return f"set `form: {next(iter(offered))}`, which reads every number of this file"
-    if any(one.pattern.fullmatch(cell) for one in NOTATIONS):
+    if is_number(cell):
         return (
             "numbers of this file are written in several ways, so that no `form` reads all of "
             "them: let the machine write it again with one decimal sign, or correct the cells"

@@ -29,9 +29,9 @@ from spinepipe.testing_machine.instruments import SYNC
 from spinepipe.testing_machine.notation import (
     AS_TIME,
     LOST,
-    NOTATIONS,
     Notation,
     clock_seconds,
+    is_number,
     notations_of,
     past_midnight,
     remedy,
@@ -340,7 +340,7 @@ def _numbers(
                 what = "open and save it in a spreadsheet program, which stores values of formulas"
             elif isinstance(channel, TimeChannel):
                 what = "leave `time` out: the machine wrote none"
-        elif bad[at].size == units and not any(n.pattern.fullmatch(cell) for n in NOTATIONS):
+        elif bad[at].size == units and not is_number(cell):
             what = f"{BELOW_UNITS} {lines[units]}}}`: no numbers stand above"
         problems.append(
             InputProblem(file, int(lines[row]), str(channel.column), found, allowed, what)

@@ -16,12 +16,12 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.testing_machine.channels import ANGLES, FORCES, LENGTHS, MOMENTS, SECONDS
 from spinepipe.testing_machine.notation import (
     LOST,
-    NOTATIONS,
     Notation,
     clock_seconds,
+    is_number,
     notations_of,
 )
-from spinepipe.testing_machine.raw_table import MOST_BYTES, RawTable, open_table, text_rows
+from spinepipe.testing_machine.raw_table import MOST_BYTES, RawTable, cell_at, open_table, text_rows
 from spinepipe.testing_machine.settings import FileForm
 
 UNITS: Mapping[str, str] = {
@@ -119,14 +119,10 @@ def _forms(data: bytes) -> Iterator[FileForm]:
         yield FileForm.model_validate(told)
 
 
-def _is_number(cell: str) -> bool:
-    return any(one.pattern.fullmatch(cell) for one in NOTATIONS)
-
-
 def _row_of_numbers(cells: list[str]) -> bool:
     """Whether two cells or more are numbers, and the others have no digits."""
     told = [one.strip() for one in cells]
-    numbers = [_is_number(one) or not np.isnan(clock_seconds(one)) for one in told]
+    numbers = [is_number(one) or not np.isnan(clock_seconds(one)) for one in told]
     others = (one for one, number in zip(told, numbers, strict=True) if not number)
     return sum(numbers) > 1 and not any(re.search("[0-9]", one) for one in others)
 
@@ -204,5 +200,6 @@ def _are_units(cells: list[str]) -> bool:
 
 def _clock(rows: list[list[str]], place: int) -> bool:
     """Whether a column has clock times."""
-    cells = [row[place] for row in rows if place < len(row) and not LOST.fullmatch(row[place])]
-    return bool(cells) and all(not np.isnan(clock_seconds(one)) for one in cells)
+    cells = (cell_at(row, place) for row in rows)
+    told = [one for one in cells if not LOST.fullmatch(one)]
+    return bool(told) and all(not np.isnan(clock_seconds(one)) for one in told)

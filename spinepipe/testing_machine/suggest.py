@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from spinepipe.cohort.checks import height
 from spinepipe.cohort.cohort import joint_names
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.imports.file_patterns import with_files
@@ -70,7 +71,7 @@ class Suggestion:
     taken : what each column is and its unit, by the key of the column.
     towards : where a positive moment turns the upper vertebra, by test; empty: not known.
     joints : joint that an angle moves, by key of the column; those left out move the lowest.
-    force_towards, load_points_mm : direction of forces that count and where they act, by key.
+    force_towards : direction of forces that count, by key. load_point_mm : where all of them act.
     """
 
     folder: Path
@@ -81,7 +82,7 @@ class Suggestion:
     vertebrae: tuple[str, ...]
     joints: dict[str | int, str]
     force_towards: dict[str | int, str] = field(default_factory=dict)
-    load_points_mm: dict[str | int, tuple[float, ...]] = field(default_factory=dict)
+    load_point_mm: list[float] = field(default_factory=list)
 
     @property
     def specimens(self) -> list[str]:
@@ -180,12 +181,9 @@ class Suggestion:
                 item["driving"] = own[name]["driving"]
             if preconditioning:
                 item["preconditioning_cycles"] = preconditioning
-            of_file = {
-                key: own[name][key]
-                for key in ("form", "time", "loads", "motion")
-                if own[name][key] != common.get(key)
-                and not (key in common and key in ("loads", "motion"))
-            }
+            differ = [key for key in ("form", "time") if own[name][key] != common[key]]
+            differ += [key for key in ("loads", "motion") if key not in common]
+            of_file = {key: own[name][key] for key in differ}
             parts = [f"{key}: {_flow(value)}" for key, value in (item | of_file).items()]
             lines.append(f"  - {_flow(item)}" if not of_file else "  - " + "\n    ".join(parts))
         return "\n".join(lines) + "\n"
@@ -236,7 +234,8 @@ def suggested(folder: Path, files: Sequence[SeenFile], pattern: str | None) -> S
     tests = dict.fromkeys(test for _, test in of.values())
     towards = {test: direction_of(test) for test in tests}
     named = {vertebra for joint in joints.values() for vertebra in re.findall(r"[SLTC]\d+", joint)}
-    chain = tuple(sorted(named, key=_height)) or ("L5", "L4")
+    heights = {one: at for one in named if (at := height(one)) is not None}
+    chain = tuple(sorted(heights, key=heights.__getitem__)) or ("L5", "L4")
     return Suggestion(folder, files, of, taken | forces, towards, chain, joints)
 
 
@@ -330,11 +329,6 @@ def _pattern(name: str, specimen: str, test: str) -> str:
     stem, end = name.rpartition(".")[0], PurePath(name).suffix
     stem = re.sub(rf"({re.escape(test)}[_\- ])\d+$", r"\1*", stem)
     return stem.replace(specimen, "{specimen}", 1) + end
-
-
-def _height(vertebra: str) -> tuple[int, int]:
-    """A key by which vertebrae go from the lowest."""
-    return "SLTC".index(vertebra[0]), -int(vertebra[1:])
 
 
 def _flow(value: Any) -> str:

@@ -115,6 +115,27 @@ def test_answers_are_taken(
     assert "preconditioning_cycles" not in written["files"][0]
 
 
+def test_an_answer_that_cannot_be_meant_is_asked_for_again(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Column 2 is told in N, so no unit of a moment is suggested by it; then it is a force."""
+    files = machine(tmp_path / "raw")
+    lines = ["2", "moments", "moment", "lbf in", "", "2", "force", "", "down", "superior"]
+    answered(monkeypatch, *lines, "a b", "0 10", "0 10 5", *[""] * 10)
+    asked = ["-C", str(tmp_path), "import", *files, "--cohort", "lab", "--dry-run"]
+    assert main([*asked, "--vertebrae", "L5"]) == 2
+    assert 'the vertebrae "L5"' in capsys.readouterr().err
+    answered(monkeypatch, *lines, "a b", "0 10", "0 10 5", *[""] * 10)
+    main(asked)
+    said = capsys.readouterr().out
+    assert "Allowed: time, moment, angle, force, no." in said
+    assert "Unit (N m, N mm, N cm) [N m]" in said
+    assert "Allowed: N m, N mm, N cm." in said
+    assert "Allowed: anterior, posterior, superior, inferior, right, left." in said
+    assert "load_point_mm: [0.0, 10.0, 5.0]" in said
+    assert "{column: Axial Force, unit: N, positive: superior}" in said
+
+
 def test_a_dry_run_and_a_stop_write_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -68,6 +68,8 @@ def test_the_first_line_leads_to_the_schema_of_its_keys(root: Path, kind: str) -
         (["study", "a b"], 'the name "a b"'),
         (["study", "mine", "--cohort", "strait"], "straight"),
         (["study", "mine", "--cohort", "straight", "--kind", "discrepanci"], "discrepancy"),
+        (["study", "mine", "--cohort", "straight", "--kind", "xyz"], "leave --kind out"),
+        (["study", "mine", "--cohort", "straight", "--design", "--misfit", "0"], "--misfit 0"),
         (
             ["study", "mine", "--cohort", "straight", "--design", "--kind", "scoliosis"],
             "--kind disc",
@@ -82,6 +84,7 @@ def test_wrong_words(
     assert new(root, *words) == 2
     assert told in capsys.readouterr().err
     assert not (root / "config/cohorts/c").exists()
+    assert not (root / "config/studies/mine.yaml").exists()
 
 
 def test_a_planned_cohort_tells_before_there_are_data_what_its_tests_could_name(
