@@ -17,8 +17,10 @@ from testable_cases import (
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.design.distinguishability import (
+    TIMES,
     confusions,
     distinguishability,
+    targets,
     usual_targets,
 )
 from spinepipe.studies.discrepancy.design.signatures import cohort_signatures
@@ -176,3 +178,15 @@ def test_where_nothing_on_the_menu_helps_no_advice_is_given():
     """A test nearly without load shows no stop, whatever single thing is added."""
     grounds = grounds_of(joints=1, moments=(0.0, 1e-3), tests=("flexion",))
     assert revealed(grounds, "facet_contact") == ""
+
+
+def test_of_what_leaves_no_trace_others_explain_nothing():
+    """Planned tests are asked of all effects, also of those that they cannot show."""
+    grounds = grounds_of()
+    tried = tried_in(grounds, ["joint_centre_offset", "flexion_extension_asymmetry"])
+    design = cohort_signatures(grounds, tried)
+    found = judgements(design, NEEDED)
+    (traceless,) = (number for number, one in enumerate(found) if not one.testable)
+    (told,) = targets(design, found, [(traceless, found[traceless].best)], [TIMES])
+    assert told.shares == {"flexion_extension_asymmetry": 0.0}
+    assert told.told_from("flexion_extension_asymmetry") is None

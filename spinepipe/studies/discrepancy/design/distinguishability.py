@@ -285,4 +285,6 @@ def _explained(
     explained = np.einsum("k,akd->a", inverse, (group.vectors.T @ moments) ** 2)
     sizes = np.array([one.typical.squared(one.typical.left) for one in targets])
     times = np.stack([one.times for one in targets])
-    return explained / sizes, expected_log_evidence(group, moments, times)
+    # of what leaves nothing there is nothing to explain
+    shares = np.divide(explained, sizes, out=np.zeros_like(explained), where=sizes > 0.0)
+    return shares, expected_log_evidence(group, moments, times)
