@@ -28,8 +28,6 @@ from spinepipe.studies.discrepancy.words import (
 UNNAMED = "what no effect explains"
 """How the subject of advice begins that is on what has no name."""
 
-NO_NAMES = (SOMETHING_ELSE, NOTHING)
-
 _MOST_WORDS_OF_CURVE = 7
 
 USEFUL = ("advised", "offered")

@@ -130,23 +130,6 @@ class IndistinctVariants:
         return problem.without_shared(gram, moments, coupled)
 
 
-@dataclass(frozen=True)
-class Summed:
-    """A form at one shape: its strengths' Gram matrix (k, k), moments (k,) and signs (k,).
-
-    Attributes
-    ----------
-    strengths : (k,) column of the effect's values that each strength is of.
-    """
-
-    form: CandidateForm
-    sds: tuple[float, ...]
-    strengths: tuple[int, ...]
-    gram: Array
-    moments: Array
-    group: Group
-
-
 class EffectColumns:
     """Columns of one effect by variant, shape, test and joint."""
 
@@ -297,20 +280,6 @@ def screened(
         tried.append(found[start + int(np.argmax(logs[start:end]))])
     order = sorted(tried, key=lambda one: -one.log_evidence)
     return Screened(trials.effect, float(log_sum(np.stack(totals))), tuple(order))
-
-
-def summed(
-    index: EffectColumns,
-    problem: Linearised,
-    form: CandidateForm,
-    sds: tuple[float, ...],
-    specimens: Sequence[str],
-    tests: Sequence[str],
-) -> Summed:
-    """A form's strengths at one shape."""
-    (alone,) = index.batches([(form, sds)], specimens, tests)
-    (gram,), (moments,) = alone.summed(problem)
-    return Summed(form, sds, alone.strengths, gram, moments, Group.of(gram, alone.signs))
 
 
 def sides(form: CandidateForm, strengths: Sequence[int]) -> Array:
