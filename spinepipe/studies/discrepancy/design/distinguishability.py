@@ -22,7 +22,6 @@ from spinepipe.studies.discrepancy.design.information import Bench
 from spinepipe.studies.discrepancy.design.signatures import (
     CohortSignatures,
     cohort_signatures,
-    summation,
     with_each_run,
 )
 from spinepipe.studies.discrepancy.design.testable import (
@@ -36,7 +35,7 @@ from spinepipe.studies.discrepancy.design.testable import (
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
-from spinepipe.studies.discrepancy.search.screen import SIZES, Group, sides
+from spinepipe.studies.discrepancy.search.screen import SIZES, Group, sides, summation
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import NotTestable, SmallestDetectable
 

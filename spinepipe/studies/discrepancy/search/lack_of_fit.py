@@ -27,7 +27,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     products,
     taken_out,
 )
-from spinepipe.studies.discrepancy.search.screen import Group
+from spinepipe.studies.discrepancy.search.screen import Group, summation
 from spinepipe.units import COORDINATES, subtract_baseline
 
 SIZE = 0.1
@@ -254,8 +254,7 @@ def _part(
         (terms[n].number, terms[n].joint if spread is not PlaceSpread.SHARED else 0) for n in chosen
     ]
     order = {key: number for number, key in enumerate(dict.fromkeys(keys))}
-    onto = np.zeros((len(order), len(chosen)))
-    onto[[order[key] for key in keys], np.arange(len(chosen))] = 1.0
+    onto = summation([order[key] for key in keys], len(order))
     grams, moments = [], []
     for part in problem.of.values():
         grams.append(onto @ part.gram[np.ix_(chosen, chosen)] @ onto.T)

@@ -18,7 +18,7 @@ from scipy.special import log_ndtr
 
 from spinepipe.decomposition import eigh
 from spinepipe.effects import PlaceSpread
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
 from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Linearised, VariantColumn
 
@@ -130,6 +130,13 @@ class IndistinctVariants:
         return problem.without_shared(gram, moments, coupled)
 
 
+def summation(owners: Indices | Sequence[int], count: int) -> Array:
+    """(k, c) sums columns onto the strengths that own them."""
+    onto = np.zeros((count, len(owners)))
+    onto[owners, np.arange(len(owners))] = 1.0
+    return onto
+
+
 class EffectColumns:
     """Columns of one effect by variant, shape, test and joint."""
 
@@ -163,8 +170,7 @@ class EffectColumns:
             places, strengths = found[some[0]]
             every = []
             for place, (specimen, _, owners) in enumerate(places):
-                onto = np.zeros((len(strengths), len(owners)))
-                onto[owners, np.arange(len(owners))] = 1.0
+                onto = summation(owners, len(strengths))
                 columns = np.stack([found[number][0][place][1] for number in some])
                 every.append((specimen, columns, onto))
             signs_of = sides(points[some[0]][0], strengths)
