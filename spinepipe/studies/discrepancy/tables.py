@@ -17,3 +17,6 @@ MODELS = WHERE.column("model").allowed
 
 ADVICE = NEXT_TESTS.column("status").allowed
 """What becomes of a run that could be added; the last two are of versions before."""
+
+UNNAMED = "what no effect explains"
+"""How the subject of advice begins that is on what has no name."""
