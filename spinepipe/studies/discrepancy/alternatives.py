@@ -14,6 +14,7 @@ from spinepipe.studies.discrepancy.misfits import (
     change_of_misfit,
     place_of_most,
 )
+from spinepipe.studies.discrepancy.tables import ADVICE, UNNAMED
 from spinepipe.studies.discrepancy.verdict import NOTHING, SOMETHING_ELSE, SURE, Verdict
 from spinepipe.studies.discrepancy.verdict import VerdictKind as Ended
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
@@ -25,14 +26,9 @@ from spinepipe.studies.discrepancy.words import (
     shape_in_words,
 )
 
-UNNAMED = "what no effect explains"
-"""How the subject of advice begins that is on what has no name."""
-
-NO_NAMES = (SOMETHING_ELSE, NOTHING)
-
 _MOST_WORDS_OF_CURVE = 7
 
-USEFUL = ("advised", "offered")
+USEFUL = ADVICE[:2]
 """Status of runs that would tell something."""
 
 

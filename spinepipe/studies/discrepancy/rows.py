@@ -38,7 +38,6 @@ MOST_FORMS_SHOWN = 5
 
 GIVEN_UP: Row = {"held_out_fold": "", "held_out_base": None, "held_out_with_effects": None}
 """Columns of ``gap`` that versions before filled."""
-"""Columns of motion as predicted by fits that did not see it."""
 
 NOT_FITTED = "the linear problem, no fit"
 """Message of what was screened: its numbers are of readings linearised at the fit before."""
@@ -300,16 +299,12 @@ def _of_refit(one: Refit, excess: float) -> Row:
 
 
 def confusion_rows(told: Distinguishability) -> list[Row]:
-    """One row per ordered pair of effects, see `Confusion`.
-
-    ``share`` : of what ``effect`` would do, that ``other`` explains; rounding may put it a little
-    outside 0 to 1, which is clipped.
-    """
+    """One row per ordered pair of effects, see `Confusion`."""
     return [
         {
             "effect": one.effect,
             "other": one.other,
-            "share": float(np.clip(one.share, 0.0, 1.0)),
+            "share": one.share,
             "gap_told_apart": one.gap,
         }
         for one in told.confusions

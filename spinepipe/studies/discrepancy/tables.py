@@ -15,7 +15,8 @@ TABULATED = declared(__file__, "tabulated")
 MODELS = WHERE.column("model").allowed
 """The two models that are compared; without a named effect they are the same."""
 
-NOT_TESTABLE = "not_testable"
-
 ADVICE = NEXT_TESTS.column("status").allowed
-"""What becomes of a run that could be added, or of an imperfection that could be known better."""
+"""What becomes of a run that could be added; the last two are of versions before."""
+
+UNNAMED = "what no effect explains"
+"""How the subject of advice begins that is on what has no name."""

@@ -44,9 +44,9 @@ from spinepipe.studies.discrepancy.search.screen import (
     SIZES,
     EffectColumns,
     Group,
+    IndistinctVariants,
     Screen,
     screened,
-    summed,
 )
 from spinepipe.studies.discrepancy.search.search_state import look
 from spinepipe.studies.discrepancy.store import at_once
@@ -145,6 +145,19 @@ def left_of(columns: Array, taken: Array) -> Array:
     return columns - taken @ np.linalg.lstsq(taken, columns)[0]
 
 
+def alone(
+    index: EffectColumns,
+    problem: Linearised,
+    form: CandidateForm,
+    sds: tuple[float, ...],
+    specimens: tuple[str, ...],
+) -> tuple[IndistinctVariants, Array, Array]:
+    """A form at one shape, and Gram matrix (k, k) and moments (k,) of its strengths."""
+    (one,) = index.batches([(form, sds)], specimens, ())
+    (gram,), (moments,) = one.summed(problem)
+    return one, gram, moments
+
+
 @sweep("spread", [PlaceSpread.SHARED, PlaceSpread.BY_JOINT, PlaceSpread.EACH])
 @sweep("shared", [0, 1, 2])
 def test_products_are_those_of_dense_projections(spread: PlaceSpread, shared: int) -> None:
@@ -158,7 +171,7 @@ def test_products_are_those_of_dense_projections(spread: PlaceSpread, shared: in
     problem = problem_of(fit, signatures)
     columns = [VariantColumn(LAXITY, (), 0, joint, EVERY_TEST, 1.0) for joint in range(3)]
     form = CandidateForm(LAXITY, spread)
-    one = summed(EffectColumns(columns), problem, form, (), list(members), ())
+    _, gram, moments = alone(EffectColumns(columns), problem, form, (), tuple(members))
 
     a, b = jacobians["a"], jacobians["b"]
     own = block_diag(a[:, :2], b[:, shared:])
@@ -171,8 +184,8 @@ def test_products_are_those_of_dense_projections(spread: PlaceSpread, shared: in
     }[spread]
     left = left_of(dense, taken)
     residual = -np.concatenate([fit.residuals["a"], fit.residuals["b"]])
-    np.testing.assert_allclose(one.gram, left.T @ left, atol=1e-9)
-    np.testing.assert_allclose(one.moments, left.T @ residual, atol=1e-9)
+    np.testing.assert_allclose(gram, left.T @ left, atol=1e-9)
+    np.testing.assert_allclose(moments, left.T @ residual, atol=1e-9)
 
 
 def test_evidence_of_many_forms_at_once_is_that_of_each() -> None:
@@ -200,16 +213,17 @@ def test_evidence_of_many_forms_at_once_is_that_of_each() -> None:
     shares = []
     for form in forms:
         grid = shape_grid(form.variant)
-        alone = [summed(index, problem, form, sds, tuple(members), ()) for sds in grid]
-        logs = [Group.of(one.gram, one.group.signs).log_evidence(one.moments) for one in alone]
+        every = [alone(index, problem, form, sds, tuple(members)) for sds in grid]
+        logs = [Group.of(gram, one.signs).log_evidence(moments) for one, gram, moments in every]
         tried = next(one for one in whole.forms if one.form == form)
-        best = alone[int(np.argmax(logs))]
-        assert (tried.sds, tried.strengths) == (best.sds, best.strengths)
+        best = int(np.argmax(logs))
+        one, gram, moments = every[best]
+        assert (tried.sds, tried.strengths) == (grid[best], one.strengths)
         share = -np.log(len(variants) * 3 * len(places))
         assert tried.log_evidence == pytest.approx(max(logs) + share, rel=1e-9)
-        b = best.group.estimate(best.moments)
+        b = Group.of(gram, one.signs).estimate(moments)
         np.testing.assert_allclose(tried.estimate, b, atol=1e-12)
-        assert tried.explained == pytest.approx(2.0 * b @ best.moments - b @ best.gram @ b)
+        assert tried.explained == pytest.approx(2.0 * b @ moments - b @ gram @ b)
         shares.append(logsumexp(logs) - np.log(len(grid)) + share)
     assert whole.log_evidence == pytest.approx(logsumexp(shares), rel=1e-9)
 

@@ -110,14 +110,6 @@ def test_a_term_loads_a_joint_by_a_tenth_of_its_springs_at_the_largest_motion() 
     np.testing.assert_allclose(above[:, 1:], 0.0, atol=1e-12)
 
 
-def test_motion_of_other_tests_may_be_the_unit() -> None:
-    twice = 2.0 * np.tile(turned()[:, None, None], (1, JOINTS, 6))
-    found = generic_columns(chain(), [FLEXION], False, ROTATIONS, [0.3 * twice, twice])
-    own = columns(found, "own", "extension", 2)[:, 2, EXTENSION]
-    largest = 2.0 * turned()[AT_LARGEST]
-    np.testing.assert_allclose(own, -0.1 * largest * (turned() / largest) ** 2, rtol=1e-6)
-
-
 @sweep("zeroed", [False, True])
 def test_readings_drift_to_a_tenth_of_the_largest_motion(zeroed: bool) -> None:
     found = generic_columns(chain(), [FLEXION, BENDING], zeroed, COORDINATES)

@@ -17,8 +17,10 @@ from testable_cases import (
 
 from spinepipe.effects import PlaceSpread
 from spinepipe.studies.discrepancy.design.distinguishability import (
+    TIMES,
     confusions,
     distinguishability,
+    targets,
     usual_targets,
 )
 from spinepipe.studies.discrepancy.design.signatures import cohort_signatures
@@ -40,8 +42,8 @@ def test_base_takes_up_what_a_straight_line_explains_of_an_absolute_value(moment
     m = np.array(moments)
     expected = np.sum(m * np.abs(m)) ** 2 / np.sum(m**2) ** 2
     found = judged(one_joint(moments), [ASYMMETRY])[ASYMMETRY.effect]
-    assert found.absorbed == pytest.approx(expected, abs=1e-3)
-    assert found.absorbed_by_base == pytest.approx(expected, abs=1e-3)
+    assert found.best.absorbed == pytest.approx(expected, abs=1e-3)
+    assert found.best.absorbed_by_base == pytest.approx(expected, abs=1e-3)
 
 
 def test_detectable_effects_have_the_evidence_needed_nine_times_in_ten():
@@ -121,7 +123,7 @@ def test_levels_differ_only_against_a_base_that_shares_stiffness():
     free = grounds_of(grouping="per_joint")
     found = judged(free, ["level_dependence"])["level_dependence"]
     assert not found.testable
-    assert found.absorbed_by_base > 0.999
+    assert found.best.absorbed_by_base > 0.999
     assert revealed(free, "level_dependence") == ""
     assert judged(grounds_of(), ["level_dependence"])["level_dependence"].testable
 
@@ -176,3 +178,15 @@ def test_where_nothing_on_the_menu_helps_no_advice_is_given():
     """A test nearly without load shows no stop, whatever single thing is added."""
     grounds = grounds_of(joints=1, moments=(0.0, 1e-3), tests=("flexion",))
     assert revealed(grounds, "facet_contact") == ""
+
+
+def test_of_what_leaves_no_trace_others_explain_nothing():
+    """Planned tests are asked of all effects, also of those that they cannot show."""
+    grounds = grounds_of()
+    tried = tried_in(grounds, ["joint_centre_offset", "flexion_extension_asymmetry"])
+    design = cohort_signatures(grounds, tried)
+    found = judgements(design, NEEDED)
+    (traceless,) = (number for number, one in enumerate(found) if not one.testable)
+    (told,) = targets(design, found, [(traceless, found[traceless].best)], [TIMES])
+    assert told.shares == {"flexion_extension_asymmetry": 0.0}
+    assert told.told_from("flexion_extension_asymmetry") is None

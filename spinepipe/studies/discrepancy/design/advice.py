@@ -19,7 +19,7 @@ from spinepipe.studies.discrepancy.search.outcome import Outcome
 from spinepipe.studies.discrepancy.search.refit import Refit
 from spinepipe.studies.discrepancy.search.search_state import SearchResult
 from spinepipe.studies.discrepancy.store import PieceRunner
-from spinepipe.studies.discrepancy.tables import ADVICE
+from spinepipe.studies.discrepancy.tables import ADVICE, UNNAMED
 from spinepipe.studies.discrepancy.verdict import VerdictKind
 from spinepipe.studies.discrepancy.verdict_unnamed import Reason
 
@@ -30,8 +30,6 @@ LEAST_GAIN = 0.5
 
 MOST_PAIRS, MOST_CHECKED = 3, 4
 """Pairs that are asked, and runs of each that are checked by refits."""
-
-UNNAMED = "what no effect explains"
 
 BY_REFIT, TO_FIRST_ORDER = "expected, both models refitted", "expected, to first order"
 

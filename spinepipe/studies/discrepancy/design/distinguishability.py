@@ -22,7 +22,6 @@ from spinepipe.studies.discrepancy.design.information import Bench
 from spinepipe.studies.discrepancy.design.signatures import (
     CohortSignatures,
     cohort_signatures,
-    summation,
     with_each_run,
 )
 from spinepipe.studies.discrepancy.design.testable import (
@@ -36,7 +35,7 @@ from spinepipe.studies.discrepancy.design.testable import (
 )
 from spinepipe.studies.discrepancy.search.baseline import BaselineFit
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
-from spinepipe.studies.discrepancy.search.screen import SIZES, Group, sides
+from spinepipe.studies.discrepancy.search.screen import SIZES, Group, sides, summation
 from spinepipe.studies.discrepancy.store import PieceRunner
 from spinepipe.studies.discrepancy.verdict import NotTestable, SmallestDetectable
 
@@ -285,4 +284,6 @@ def _explained(
     explained = np.einsum("k,akd->a", inverse, (group.vectors.T @ moments) ** 2)
     sizes = np.array([one.typical.squared(one.typical.left) for one in targets])
     times = np.stack([one.times for one in targets])
-    return explained / sizes, expected_log_evidence(group, moments, times)
+    # of what leaves nothing there is nothing to explain
+    shares = np.divide(explained, sizes, out=np.zeros_like(explained), where=sizes > 0.0)
+    return shares, expected_log_evidence(group, moments, times)

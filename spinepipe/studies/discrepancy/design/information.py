@@ -36,6 +36,7 @@ from spinepipe.studies.discrepancy.search.prediction import (
     bushing_stiffness,
 )
 from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, SEEN, UNSEEN
+from spinepipe.studies.discrepancy.search.screen import summation
 from spinepipe.studies.discrepancy.search.whitening import Whitening, whitening
 from spinepipe.units import COORDINATES, subtract_baseline
 
@@ -122,9 +123,8 @@ class Information:
 
     def _among(self, keys: Sequence[Key]) -> "Information":
         """The same by these keys, those of its own among them."""
-        onto = np.zeros((len(keys), len(self.keys)))
         place = {key: number for number, key in enumerate(keys)}
-        onto[[place[key] for key in self.keys], np.arange(len(self.keys))] = 1.0
+        onto = summation([place[key] for key in self.keys], len(keys))
         uu, uj, uf = onto @ self.uu @ onto.T, onto @ self.uj, onto @ self.uf
         return replace(self, keys=tuple(keys), uu=uu, uj=uj, uf=uf)
 

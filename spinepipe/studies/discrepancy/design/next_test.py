@@ -9,6 +9,7 @@ shows a difference makes it.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -171,14 +172,22 @@ class TriedRuns:
                 if isinstance(one, str):
                     raise NoPose(one)
                 more[name] = more[name].plus(one)
+        gained = self._noncentrality(more) - self._now
+        return 0.5 * self.share * max(0.0, gained)
+
+    @cached_property
+    def _now(self) -> float:
+        """The noncentrality without any run."""
+        return self._noncentrality(self.there)
+
+    def _noncentrality(self, of: Mapping[str, Information]) -> float:
         hypothesis = self.pattern.fit.hypothesis
         sds = np.array([u.sd for u in hypothesis.unknowns])
         numbers: dict[str, Indices] = {
             name: np.array(member.numbers, dtype=np.int64)
             for name, member in hypothesis.members.items()
         }
-        gained = noncentrality(more, numbers, sds) - noncentrality(self.there, numbers, sds)
-        return 0.5 * self.share * max(0.0, gained)
+        return noncentrality(of, numbers, sds)
 
 
 def remaining_chi2(pattern: RivalFits, place: Bench, words: str | None) -> float | None:

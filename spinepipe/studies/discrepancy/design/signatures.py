@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from spinepipe.effects.contract import Array, Indices
+from spinepipe.effects.contract import Array
 from spinepipe.model import LoadCase
 from spinepipe.studies.discrepancy.design.information import (
     Bench,
@@ -28,7 +28,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     columns_of,
     signatures,
 )
-from spinepipe.studies.discrepancy.search.screen import EffectColumns, Places
+from spinepipe.studies.discrepancy.search.screen import EffectColumns, Places, summation
 
 MOST_STEPS = 25
 """Of a run; more are thinned, which errs on the safe side."""
@@ -102,13 +102,6 @@ class CohortSignatures:
                 total += onto @ one[np.ix_(columns, columns)] @ onto.T
         raw, refitted, left = found
         return raw, refitted, left
-
-
-def summation(owners: Indices, count: int) -> Array:
-    """(k, c) sums columns onto the strengths that own them."""
-    onto = np.zeros((count, len(owners)))
-    onto[owners, np.arange(len(owners))] = 1.0
-    return onto
 
 
 def specimen_signatures(grounds: BaselineFit, specimen: str, those: Candidates) -> Information:

@@ -140,8 +140,7 @@ class Judgement:
     Attributes
     ----------
     testable : whether the tests can show it. why : they cannot, in words; empty where they can.
-    best : its form that shows best. absorbed, absorbed_by_base : shares of its squared signature
-        taken up by base and nuisances, and by the base alone.
+    best : its form that shows best.
     detectable : the smallest over variants; None where nothing is ever found.
     """
 
@@ -149,8 +148,6 @@ class Judgement:
     testable: bool
     why: str
     best: Typical
-    absorbed: float
-    absorbed_by_base: float
     detectable: Detectable | None
 
 
@@ -175,8 +172,7 @@ def judgements(design: CohortSignatures, needed: float) -> tuple[Judgement, ...]
         gaps = [gap for form, gap in found if gap is not None and _shown(form, gap) == shown]
         least = min(gaps, key=lambda detectable: detectable.gap, default=None)
         why = "" if shown else _why(best, weakest)
-        absorbed = best.absorbed, best.absorbed_by_base
-        judged.append(Judgement(one.effect, shown, why, best, *absorbed, least))
+        judged.append(Judgement(one.effect, shown, why, best, least))
     return tuple(judged)
 
 

@@ -27,7 +27,7 @@ from spinepipe.studies.discrepancy.search.projected import (
     products,
     taken_out,
 )
-from spinepipe.studies.discrepancy.search.screen import Group
+from spinepipe.studies.discrepancy.search.screen import Group, summation
 from spinepipe.units import COORDINATES, subtract_baseline
 
 SIZE = 0.1
@@ -73,19 +73,15 @@ def generic_columns(
     cases: Sequence[LoadCase],
     zeroed: bool,
     coordinates: Sequence[str],
-    reached: Sequence[Array] | None = None,
     shifted: Sequence[str] = (),
 ) -> GenericColumns:
     """The generic basis of a specimen where its model stands.
 
-    Parameters
-    ----------
-    reached : motions (T, J, 6) whose largest is the unit of the terms; None for those of ``cases``.
-    shifted : tests that may have a shift of their own; none tells how that of another test is.
+    ``shifted`` : tests that may have a shift of their own; none tells how that of another test is.
     """
     solved = SolvedSpecimen(model, cases, zeroed)
     motions = solved.poses
-    largest = [np.abs(q).max(axis=0) for q in (motions if reached is None else reached)]
+    largest = [np.abs(q).max(axis=0) for q in motions]
     reach = np.maximum(np.max(largest, axis=0), LEAST_REACH)
     bushings = bushing_stiffness(model)
     stiffness = np.where(bushings > 0.0, bushings, 1.0)  # 1 where a joint has none
@@ -258,8 +254,7 @@ def _part(
         (terms[n].number, terms[n].joint if spread is not PlaceSpread.SHARED else 0) for n in chosen
     ]
     order = {key: number for number, key in enumerate(dict.fromkeys(keys))}
-    onto = np.zeros((len(order), len(chosen)))
-    onto[[order[key] for key in keys], np.arange(len(chosen))] = 1.0
+    onto = summation([order[key] for key in keys], len(order))
     grams, moments = [], []
     for part in problem.of.values():
         grams.append(onto @ part.gram[np.ix_(chosen, chosen)] @ onto.T)

@@ -18,7 +18,7 @@ from scipy.special import log_ndtr
 
 from spinepipe.decomposition import eigh
 from spinepipe.effects import PlaceSpread
-from spinepipe.effects.contract import Array
+from spinepipe.effects.contract import Array, Indices
 from spinepipe.studies.discrepancy.search.hypothesis import CandidateForm, Trials, shape_grid
 from spinepipe.studies.discrepancy.search.projected import EVERY_TEST, Linearised, VariantColumn
 
@@ -130,21 +130,11 @@ class IndistinctVariants:
         return problem.without_shared(gram, moments, coupled)
 
 
-@dataclass(frozen=True)
-class Summed:
-    """A form at one shape: its strengths' Gram matrix (k, k), moments (k,) and signs (k,).
-
-    Attributes
-    ----------
-    strengths : (k,) column of the effect's values that each strength is of.
-    """
-
-    form: CandidateForm
-    sds: tuple[float, ...]
-    strengths: tuple[int, ...]
-    gram: Array
-    moments: Array
-    group: Group
+def summation(owners: Indices | Sequence[int], count: int) -> Array:
+    """(k, c) sums columns onto the strengths that own them."""
+    onto = np.zeros((count, len(owners)))
+    onto[owners, np.arange(len(owners))] = 1.0
+    return onto
 
 
 class EffectColumns:
@@ -180,8 +170,7 @@ class EffectColumns:
             places, strengths = found[some[0]]
             every = []
             for place, (specimen, _, owners) in enumerate(places):
-                onto = np.zeros((len(strengths), len(owners)))
-                onto[owners, np.arange(len(owners))] = 1.0
+                onto = summation(owners, len(strengths))
                 columns = np.stack([found[number][0][place][1] for number in some])
                 every.append((specimen, columns, onto))
             signs_of = sides(points[some[0]][0], strengths)
@@ -297,20 +286,6 @@ def screened(
         tried.append(found[start + int(np.argmax(logs[start:end]))])
     order = sorted(tried, key=lambda one: -one.log_evidence)
     return Screened(trials.effect, float(log_sum(np.stack(totals))), tuple(order))
-
-
-def summed(
-    index: EffectColumns,
-    problem: Linearised,
-    form: CandidateForm,
-    sds: tuple[float, ...],
-    specimens: Sequence[str],
-    tests: Sequence[str],
-) -> Summed:
-    """A form's strengths at one shape."""
-    (alone,) = index.batches([(form, sds)], specimens, tests)
-    (gram,), (moments,) = alone.summed(problem)
-    return Summed(form, sds, alone.strengths, gram, moments, Group.of(gram, alone.signs))
 
 
 def sides(form: CandidateForm, strengths: Sequence[int]) -> Array:
