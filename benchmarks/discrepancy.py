@@ -15,6 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks.equilibria import tree_of
 from benchmarks.study import ROOT, Run, copy_of_project, run_workflow
 from tests.generators import shear_slopes
 from tests.generators.hidden import Recipe, draw_hidden, make
@@ -112,10 +113,7 @@ def works(slopes: Path | None) -> Iterator[Work]:
 
 def beside(old: str, slopes: Path | None) -> Iterator[Beside]:
     """Each from nothing, at HEAD and at an older commit."""
-    tree = ROOT / ".benchmarks" / f"discrepancy-{old}"
-    tree.mkdir(parents=True, exist_ok=True)
-    archive = subprocess.run(["git", "archive", old], cwd=ROOT, stdout=subprocess.PIPE, check=True)
-    subprocess.run(["tar", "-x"], cwd=tree, input=archive.stdout, check=True)
+    tree = tree_of(old, "discrepancy")
     # what is compiled lies beside the code, and copies of a tree have it
     compiling = [sys.executable, "-m", "spinepipe.cli.engine"]
     subprocess.run(compiling, cwd=tree, env=os.environ | {"PYTHONPATH": str(tree)}, check=True)

@@ -6,6 +6,7 @@ file, in turn, each in processes of its own; the least of their CPU times counts
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -83,12 +84,19 @@ def figures() -> Figures:
     return found
 
 
-def beside(old: str) -> list[tuple[str, float, float]]:
-    """What is measured, at HEAD and at an older commit."""
-    folder = ROOT / ".benchmarks" / f"equilibria-{old}"
-    folder.mkdir(parents=True, exist_ok=True)
+def tree_of(old: str, part: str) -> Path:
+    """Files of an older commit for a part of the benchmarks; a name such as HEAD~1 moves."""
+    folder = ROOT / ".benchmarks" / f"{part}-{old}"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
     archive = subprocess.run(["git", "archive", old], cwd=ROOT, stdout=subprocess.PIPE, check=True)
     subprocess.run(["tar", "-x"], cwd=folder, input=archive.stdout, check=True)
+    return folder
+
+
+def beside(old: str) -> list[tuple[str, float, float]]:
+    """What is measured, at HEAD and at an older commit."""
+    folder = tree_of(old, "equilibria")
     turns: list[list[Figures]] = [[], []]
     for _ in range(TURNS):
         for found, tree in zip(turns, (ROOT, folder), strict=True):

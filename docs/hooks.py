@@ -33,6 +33,13 @@ PLACES = {
 }
 """Where pages that lie outside of `docs/` stand in the site, by their place in the repository."""
 
+PICTURES = {
+    path.relative_to(ROOT).as_posix(): f"measured/{name}/{path.name}"
+    for name, folder in MEASURED.items()
+    for path in sorted(folder.glob("*.png"))
+}
+"""The same of pictures."""
+
 _LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s#]+)(#[^)\s]*)?\)")
 
 
@@ -49,10 +56,6 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
         {"Decisions": [f"decisions/{path.name}" for path in decisions]},
         {"Measured": [place for place in PLACES.values() if place.startswith("measured/")]},
     ]
-    use = next(part["Use"] for part in config.nav or [] if "Use" in part)
-    for name in ("install.md", "from-an-older-version.md"):
-        if (ROOT / "docs" / name).is_file():
-            use.append(name)
     results = next(part["Results"] for part in config.nav or [] if "Results" in part)
     results.append({"Tables": [{kind: pages} for kind, pages in tables.items()]})
     return config
@@ -64,10 +67,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for source, place in PLACES.items():
         if place != "index.md":
             made[place] = (ROOT / source).read_text(encoding="utf-8")
-    for name, folder in MEASURED.items():
-        for picture in folder.glob("*.png"):
-            place = f"measured/{name}/{picture.name}"
-            files.append(File.generated(config, place, abs_src_path=str(picture)))
+    for source, place in PICTURES.items():
+        files.append(File.generated(config, place, abs_src_path=str(ROOT / source)))
     for place, text in made.items():
         written = files.get_file_from_path(place)  # `spinepipe docs` may have written it
         if written is not None:
@@ -87,11 +88,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         if "://" in target or target.startswith("mailto:"):
             return found[0]
         path = normpath(str(PurePosixPath(source).parent / target))
-        place = PLACES.get(path)
+        place = PLACES.get(path) or PICTURES.get(path)
         if place is None and path.startswith("docs/"):
             place = path.removeprefix("docs/")
-        if place is None and picture:
-            place = path.replace("benchmarks/results", "measured/benchmarks")
         if place is None or files.get_file_from_path(place) is None:
             return f"{words} (`{path}`)" if words.strip("`") != path else words
         return (

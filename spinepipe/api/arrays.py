@@ -7,11 +7,9 @@ import xarray as xr
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.names import EVERYONE
-from spinepipe.units import COORDINATE_COLUMNS, COORDINATE_UNITS, COORDINATES
+from spinepipe.units import COORDINATE_COLUMNS, COORDINATE_UNITS
 
-MOTION_UNITS = dict(
-    zip(COORDINATE_COLUMNS, map(COORDINATE_UNITS.__getitem__, COORDINATES), strict=True)
-)
+MOTION_UNITS = dict(zip(COORDINATE_COLUMNS, COORDINATE_UNITS.values(), strict=True))
 MOTION_KEYS = ("specimen", "test", "cycle", "step", "joint")
 
 _LOADS = {
@@ -55,7 +53,7 @@ def of_cohort(cohort: Cohort) -> xr.Dataset:
                 by = keys if place["cycle"].isna().all() else [*keys, "cycle"]
                 parts.append(arrays(place[[*by, *_LOADS]], by, _LOADS))
     found = xr.merge(parts, join="outer", compat="no_conflicts")
-    sd = cohort.reading_sd()
-    for name, value in zip(COORDINATE_COLUMNS, () if sd is None else sd, strict=sd is not None):
-        found[f"sd_{name}"] = xr.DataArray(value, attrs={"units": MOTION_UNITS[name]})
+    if (sd := cohort.reading_sd()) is not None:
+        for name, value in zip(COORDINATE_COLUMNS, sd, strict=True):
+            found[f"sd_{name}"] = xr.DataArray(value, attrs={"units": MOTION_UNITS[name]})
     return found.assign_attrs(cohort=cohort.name, title=cohort.title)

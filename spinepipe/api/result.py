@@ -16,7 +16,7 @@ import spinepipe
 from spinepipe.citing.cite import methods
 from spinepipe.cohort import Cohort
 from spinepipe.files import appearing
-from spinepipe.report.conclusions import Told, rows_of, sentences_of, told
+from spinepipe.report.conclusions import Told, sentences_of, told
 from spinepipe.report.page.study_page import ResultTables
 from spinepipe.schema import Table
 from spinepipe.studies.registry import PACKAGE
@@ -87,7 +87,7 @@ class Shown:
     @property
     def quality(self) -> pd.DataFrame:
         """How far to trust it: ``light`` (ok, check, stop), ``check``, ``finding``; worst first."""
-        return quality(pd.DataFrame(rows_of(self.conclusions)))
+        return quality(self.conclusions)
 
     def plot(self, ax: Any = None) -> Any:
         """The key figure, as `matplotlib.axes.Axes`: ``ax``, or new ones."""

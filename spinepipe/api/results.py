@@ -104,7 +104,7 @@ class Results(Shown, Mapping[str, pd.DataFrame]):
         table, rows = next(iter(self.tidy.values()))
         return with_units(table, rows)
 
-    @property
+    @cached_property
     def tidy(self) -> dict[str, tuple[Table, pd.DataFrame]]:
         """Tidy tables by name, each with what its columns are."""
         return tidied(self.provenance["kind"], self)

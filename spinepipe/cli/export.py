@@ -67,7 +67,7 @@ def command(
     if sum(one is not None for one in (output, tables, to)) != 1:
         raise WrongUsage(
             "one of -o, --to and --tables is needed",
-            "a model: -o FILE; tidy tables: --to csv; all tables: --tables DIR",
+            "a model: -o FILE; tidy tables: --to csv; all tables: --tables FOLDER",
         )
     ending = ".osim" if matrix is None else ".csv"
     if output is not None and output.suffix != ending:

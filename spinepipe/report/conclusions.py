@@ -159,6 +159,11 @@ class Told:
         """Of a light or a condition: ``ok``, ``check`` or ``stop``."""
         return self.verdict.partition("_")[0]
 
+    @property
+    def whole(self) -> str:
+        """Heading and text in one, as the table ``conclusions`` has them."""
+        return f"{self.heading}: {self.text}" if self.heading else self.text
+
 
 def told(conclusions: Iterable[Conclusion], sentences: Sequence[Sentence]) -> list[Told]:
     """Conclusions in words, in the order of the table of sentences.
@@ -192,7 +197,7 @@ def rows_of(conclusions: Iterable[Told]) -> list[dict[str, object]]:
     rows: list[dict[str, object]] = []
     for order, one in enumerate(conclusions):
         head = {"order": order, "place": one.place, "rule": one.rule, "verdict": one.verdict}
-        head |= {"text": f"{one.heading}: {one.text}" if one.heading else one.text}
+        head |= {"text": one.whole}
         for name, value in one.values.items() or (("", None),):
             parts = ("number", "unit", "low", "high", "n", "source")
             told_of = {part: None if value is None else getattr(value, part) for part in parts}

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.cohort.load_response import joint_loads
-from spinepipe.cohort.measured import MeasuredCycle, measured_specimen
+from spinepipe.cohort.load_response import LoadedCycle, joint_loads
+from spinepipe.cohort.measured import measured_specimen
 from spinepipe.report.words import plain
-from spinepipe.units import COORDINATE_UNITS, COORDINATES, DISPLAY_PER_SI, LOAD_UNITS
+from spinepipe.units import COORDINATE_UNITS, COORDINATES, LOAD_UNITS, from_si
 
 
 def measured_summary(cohort: Cohort, tests: Sequence[str] | None = None) -> pd.DataFrame:
@@ -21,31 +21,35 @@ def measured_summary(cohort: Cohort, tests: Sequence[str] | None = None) -> pd.D
     for name in cohort.specimen_names:
         one = measured_specimen(cohort, str(name), list(tests or cohort.tests))
         for test in one.tests:
-            cycles = [cycle for cycle in one.tested if cycle.case.test == test]
-            at = next((cycle.loaded for cycle in cycles if cycle.loaded), None)
+            tested = [cycle for cycle in one.tested if cycle.case.test == test]
+            at = next((cycle.loaded for cycle in tested if cycle.loaded), None)
             if at is None:
                 continue
-            loads = [joint_loads(one.frames, cycle.case) for cycle in cycles]
+            cycles = [
+                LoadedCycle(
+                    one.specimen,
+                    cycle.case,
+                    one.frames,
+                    joint_loads(one.frames, cycle.case),
+                    cycle.readings,
+                )
+                for cycle in tested
+            ]
             for joint, label in enumerate(cohort.joint_names):
-                rows += _rows(cycles, loads, joint, at, (str(name), test, label))
+                rows += _rows(cycles, joint, at, (one.specimen, test, label))
     return pd.DataFrame(rows)
 
 
 def _rows(
-    cycles: Sequence[MeasuredCycle],
-    loads: Sequence[np.ndarray],
-    joint: int,
-    at: str,
-    place: tuple[str, str, str],
+    cycles: Sequence[LoadedCycle], joint: int, at: str, place: tuple[str, str, str]
 ) -> Iterator[dict[str, object]]:
     c = COORDINATES.index(at)
-    motion = [cycle.readings[:, joint, c] * DISPLAY_PER_SI[c] for cycle in cycles]
+    motion = [from_si(cycle.from_rest)[:, joint, c] for cycle in cycles]
     read = np.concatenate(motion)
     if not np.isfinite(read).any():
         return
-    load = np.concatenate([one[:, joint, c] for one in loads])
-    # where motion was zeroed, step 0 has no reading and is 0
-    low, high = min(np.nanmin(read), 0.0), max(np.nanmax(read), 0.0)
+    load = np.concatenate([cycle.loads[:, joint, c] for cycle in cycles])
+    low, high = np.nanmin(read), np.nanmax(read)
     alike = len({len(one) for one in motion}) == 1 and len(motion) > 1
     steps = np.stack(motion) if alike else np.empty((0, 0))
     steps = steps[:, np.isfinite(steps).all(axis=0)]

@@ -7,7 +7,7 @@ status comes first. A column whose unit hangs on the row becomes one column per 
 """
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache
@@ -19,7 +19,7 @@ import pandas as pd
 
 from spinepipe.documents.names import EVERYONE
 from spinepipe.files import appearing
-from spinepipe.report.conclusions import read_back
+from spinepipe.report.conclusions import Told, read_back
 from spinepipe.schema import Column, Table
 from spinepipe.schema.datapackage import FILE, descriptor
 from spinepipe.studies.registry import kind_of
@@ -74,14 +74,14 @@ def tidied(kind: str, frames: Mapping[str, pd.DataFrame]) -> dict[str, tuple[Tab
             if len(chosen):
                 made[row["tidy"]] = _made(row["tidy"], row["columns"].split(), shape, chosen)
     if CONCLUSIONS.name in frames:
-        made[QUALITY.name] = QUALITY, quality(frames[CONCLUSIONS.name])
+        made[QUALITY.name] = QUALITY, quality(read_back(frames[CONCLUSIONS.name]))
     return made
 
 
-def quality(conclusions: pd.DataFrame) -> pd.DataFrame:
+def quality(conclusions: Iterable[Told]) -> pd.DataFrame:
     """Lights of a page as `QUALITY`, the worst first."""
-    lights = [one for one in read_back(conclusions) if one.place == "light"]
-    rows = [(one.level, *one.text.split(": ", 1)) for one in lights]
+    lights = [one for one in conclusions if one.place == "light"]
+    rows = [(one.level, *one.whole.split(": ", 1)) for one in lights]
     ranked = sorted(rows, key=lambda one: -QUALITY.columns[0].allowed.index(one[0]))
     return pd.DataFrame(ranked, columns=QUALITY.names)
 

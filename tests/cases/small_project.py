@@ -136,18 +136,26 @@ class Project:
         assert done.returncode == 0, done.stdout
         return done.stdout
 
-    def spinepipe(self, *arguments: str) -> str:
-        """What `spinepipe` said to these arguments, on both streams."""
-        return subprocess.run(
+    def started(
+        self, *arguments: str, stderr: int = subprocess.PIPE, **variables: str
+    ) -> "subprocess.Popen[str]":
+        """`spinepipe` at work on these arguments; ``variables`` of its environment are added."""
+        return subprocess.Popen(
             [sys.executable, "-m", "spinepipe.cli", *arguments],
             cwd=self.folder,
-            env=self.environment(),
+            env={**self.environment(), **variables},
             stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            stderr=stderr,
             text=True,
-            timeout=_HANGS_S,
-            check=False,
-        ).stdout
+        )
+
+    def spinepipe(self, *arguments: str) -> str:
+        """What `spinepipe` said to these arguments, on both streams."""
+        process = self.started(*arguments, stderr=subprocess.STDOUT)
+        try:
+            return process.communicate(timeout=_HANGS_S)[0]
+        finally:
+            process.kill()
 
     def rerun(self, *targets: str) -> set[str]:
         """Run again; the result files that were written."""

@@ -1,5 +1,6 @@
 """`spinepipe show`: the rows that sum up what was measured, against the cohort's own tables."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import spinepipe as sp
@@ -25,3 +26,16 @@ def test_each_row_is_of_its_specimen_test_and_joint() -> None:
         assert row["cycles"] == own["cycle"].nunique()
         again = read.groupby(own["step"]).std().max()
         assert row["repeats_within"] == f"{again:.2g}"
+
+
+def test_a_range_has_no_zero_that_was_not_read() -> None:
+    """Of a rig that starts elsewhere, and whose motion was not zeroed."""
+    cohort = sp.read_cohort(ROOT / "config" / "cohorts" / "stiffening_spines")
+    assert cohort.motion is not None
+    moved = cohort.motion.assign(extension_deg=cohort.motion["extension_deg"] + 30.0)
+    rows = measured_summary(replace(cohort, motion=moved), ["flexion_extension"])
+    row = rows.iloc[0]
+    own = moved[(moved[["specimen", "test", "joint"]] == row.iloc[:3].tolist()).all(axis=1)]
+    read = own["extension_deg"]
+    assert read.min() > 0.0
+    assert row["range"] == f"{read.min():.3g} to {read.max():.3g} deg"

@@ -7,8 +7,6 @@ finished, and a plan that is not what the run then does.
 import json
 import shutil
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -35,20 +33,9 @@ def run_job(job, rule, wildcards, *others):
 """Added to the Snakefile: the job of one of six specimens is another one."""
 
 
-def started(project: Project, *arguments: str) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        [sys.executable, "-m", "spinepipe.cli", *arguments],
-        cwd=project.folder,
-        env=project.environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-
-
 def ended(project: Project, *arguments: str) -> tuple[int, str, str]:
     """Exit code and both streams of a command."""
-    process = started(project, *arguments)
+    process = project.started(*arguments)
     out, err = process.communicate(timeout=1200)
     assert "Traceback" not in err, err
     return process.returncode, out, err
@@ -98,7 +85,7 @@ def test_a_failed_job_ends_with_its_own_words_and_3(toy_copy: Project) -> None:
 def test_a_stopped_run_keeps_what_is_finished(toy_copy: Project) -> None:
     """The one job left says that it is at work, and never ends by itself."""
     accident(toy_copy, "open('at_work', 'w').close(); __import__('time').sleep(1000)")
-    process = started(toy_copy, "run", STUDY, "--keep-going", "-j2")
+    process = toy_copy.started("run", STUDY, "--keep-going", "-j2")
     while not toy_copy.path("at_work").exists():
         assert process.poll() is None, process.communicate()
         time.sleep(0.1)

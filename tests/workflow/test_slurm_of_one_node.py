@@ -7,7 +7,6 @@ that exceeds its time and takes others along, a killed run that cannot be taken 
 import os
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -47,14 +46,8 @@ def run_job(job, rule, wildcards, *others):
 
 
 def start(project: Project, cluster: dict[str, str]) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        [sys.executable, "-m", "spinepipe.cli", *OPTIONS],
-        cwd=project.folder,
-        env={**project.environment(), **{name: cluster[name] for name in ("SLURM_CONF", "PATH")}},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
+    own = {name: cluster[name] for name in ("SLURM_CONF", "PATH")}
+    return project.started(*OPTIONS, stderr=subprocess.STDOUT, **own)
 
 
 def queue(cluster: dict[str, str], states: str) -> list[str]:
