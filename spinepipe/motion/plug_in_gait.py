@@ -30,7 +30,7 @@ ARMS = tuple(side + name for side in "LR" for name in ("SHO", "ELB", "WRA", "WRB
 NEEDED = (*PELVIS, "C7", "T10", "CLAV", "STRN", *HEAD, *ARMS)
 """RBAK tells left from right where markers are looked at; it may be left out."""
 
-L5S1_OF_WIDTH = several(__name__, "l5s1_over_pelvis_width")
+L5S1_OF_WIDTH = several(__name__, "lumbosacral_over_pelvis_width")
 """Forwards and up from the middle between both anterior spines, by sex."""
 
 SHOULDER_OF_DEPTH = several(__name__, "shoulder_over_thorax_depth")[""]
