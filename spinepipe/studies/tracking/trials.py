@@ -7,11 +7,8 @@ from pathlib import Path
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import read_forms
-from spinepipe.studies.recordings import RECORDED, STANCE, TRIALS
+from spinepipe.studies.recordings import MOVING, RECORDED, STANCE, TRIALS
 from spinepipe.studies.tracking.settings import LEARNT, OWN, Approach, Tracking
-
-MOVING = ("flexion_extension", "lateral_bending", "axial_rotation")
-"""Kinds of trials that move, in the order of the rotation that they are about."""
 
 AXIS = {kind: axis for axis, kind in enumerate(MOVING)}
 """Rotation that a kind of motion is about, among extension, right bending and left rotation."""
