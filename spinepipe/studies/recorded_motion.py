@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.motion.joint_tables import ratio_sets
+from spinepipe.motion.joint_tables import USUAL_SHARES, ratio_sets
 from spinepipe.motion.lifted_load import LiftedLoad, borne_by_height, borne_by_plates
 from spinepipe.motion.plug_in_gait import NEEDED, marker_places
 from spinepipe.motion.recorded_motion import RecordedMotion, move
@@ -27,8 +27,6 @@ from spinepipe.studies.recordings import (
     trial_rows,
 )
 from spinepipe.units import MM_PER_M
-
-USUAL_SHARES = "christophy_2012"
 
 EVEN = 0.01
 """Share by which steps of time may differ."""
