@@ -109,6 +109,14 @@ def renamed(file: str, names: dict[str, str]) -> Callable[[Path], None]:
     return edit
 
 
+def axes(text: str) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        trials = pd.read_csv(folder / "trials.csv")
+        trials.assign(axes=text).to_csv(folder / "trials.csv", index=False)
+
+    return edit
+
+
 def exchanged(one: str, other: str) -> dict[str, str]:
     return {one: other, other: one}
 
@@ -132,6 +140,8 @@ def another_day(rows: pd.DataFrame) -> None:
         (box(late), "box.csv -0.50 s would fit"),
         (box(another_day), "put it on the clock of the markers"),
         (renamed("stance", exchanged("LASI", "RASI")), "LASI and RASI"),
+        (axes("-x z y"), "did you mean 'x z -y'?"),
+        (axes("z x y"), "off upright as it begins"),
         (renamed("lift1", exchanged("C7", "STRN")), "exchange the two names"),
         (renamed("lift1", exchanged("LELB", "LWRA")), "mm in the stance"),
         (renamed("lift2", {"T10": "T11"}), "T10: found no such marker"),
