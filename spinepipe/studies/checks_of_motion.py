@@ -10,8 +10,8 @@ from spinepipe.frames import zxy_angles
 from spinepipe.motion.marker_groups import rigid_rotations
 from spinepipe.motion.reading import axes_of
 from spinepipe.problems import InputProblem
-from spinepipe.studies.tracking.checks_of_markers import LoadedTrial, marker_problems
-from spinepipe.studies.tracking.trials import MOVING, STANCE
+from spinepipe.studies.checks_of_markers import LoadedTrial, marker_problems
+from spinepipe.studies.recordings import MOVING, STANCE
 from spinepipe.units import DEG_PER_RAD
 
 LIKE_THE_SET = (0.4, 2.5)
@@ -44,10 +44,10 @@ def motion_problems(look: LoadedTrial) -> Iterator[InputProblem]:
         remedy = "check names and units of file and set"
         if LIKE_THE_SET[0] < size / nearest < LIKE_THE_SET[1]:
             held, told = MISTAKEN[nearest]
-            remedy = f"is it in {held} and says {told}? or is marker_set.csv not in mm?"
+            remedy = f"is it in {held} and says {told}? or is {look.set} not in mm?"
         times = f"{size:.{0 if size >= 1 else 4}f} times"
         allowed = f"{LIKE_THE_SET[0]:g} to {LIKE_THE_SET[1]:g} times"
-        wrong = f"markers spread {times} as far as in marker_set.csv"
+        wrong = f"markers spread {times} as far as in {look.set}"
         yield look.in_motion(None, wrong, allowed, remedy)
         return
     if (fault := _upright(look)) is not None:
@@ -81,11 +81,11 @@ def _upright(look: LoadedTrial) -> InputProblem | None:
     if lean <= limit:
         return None
     found = f"'{look.axes}', and the trunk is {lean:.0f} deg off upright as it begins"
-    remedy = f"check which axis of the file is up; did you mean '{_better_axes(look.axes, turn)}'?"
+    remedy = f"check which axis of the file is up; did you mean '{better_axes(look.axes, turn)}'?"
     return look.in_table("axes", found, f"at most {limit:g} deg", remedy)
 
 
-def _better_axes(axes: str, turn: Array) -> str:
+def better_axes(axes: str, turn: Array) -> str:
     """Axes with which the markers would stand as in the set, to the nearest right angle."""
     # a signed permutation: the largest entry left, then none of its row and column
     nearest = np.zeros((3, 3))
