@@ -59,7 +59,7 @@ class TrunkFiles(StudyFiles):
         Figure(
             "tuned_pressures", "Pressures before and after fitting", "charts:tuned", ("pressures",)
         ),
-        Figure("strength", "Strength that the model needs", "charts_of_trust:strength", ("tasks",)),
+        Figure("strength", "Muscle stress that tasks take", "charts_of_trust:strength", ("tasks",)),
         Figure(
             "drivers",
             "Where the spread of the loads comes from",

@@ -84,7 +84,7 @@ def answer_of(
     if good.empty:
         return None
     intervals = of_person(tables.get("intervals", pd.DataFrame()), person)
-    known = intervals.dropna(subset=["low", "high"])["task"] if len(intervals) else ()
+    known = intervals.dropna(subset=["low"])["task"] if len(intervals) else ()
     rank = pd.DataFrame(
         {
             "sampled": good["task"].isin(list(known)),
