@@ -134,7 +134,8 @@ class Solving(BaseModel):
         default=0.5,
         ge=0,
         le=10,
-        description="moment that may be left over before a task counts as beyond strength",
+        description="moment that may be left over before a task counts as beyond strength, after "
+        "more muscle stress was tried",
     )
     most_iterations: int = Field(default=60, ge=2, le=1000, description="rounds at most")
     stiffness_gain: float = Field(
@@ -144,7 +145,9 @@ class Solving(BaseModel):
         description="q of a muscle's stiffness q force / length, in the question of stability",
     )
     strength: bool = Field(
-        default=True, description="whether to find the strength left at every level"
+        default=True,
+        description="whether to find the strength left at every level, and the least stress of "
+        "tasks that less than allowed holds",
     )
 
 
