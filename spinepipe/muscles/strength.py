@@ -81,7 +81,7 @@ def hold_task(
         For a load that the arms do not reach.
     """
     asked = solve_task(person, task, options)
-    now = HeldTask(asked, asked, person, task, least_stress_pa(asked))
+    now = HeldTask(asked, asked, person, task, _least_pa(asked, options))
     # with L5S1 balanced alone, what other joints ask for is not to be made
     if options.lowest_alone or (_is_held(now, options) and not seek_least):
         return now
@@ -109,9 +109,10 @@ def above_asked(solved: SolvedTask, asked: Task, held: Task) -> SolvedTask:
     """Forces of a task held at more stress than was asked for, with a status that says so."""
     if solved.status is not Balanced.CONVERGED or held.stress_pa <= asked.stress_pa:
         return solved
-    message = (
+    stress = (
         f"at {_MPA * held.stress_pa:.2f} MPa of muscle stress, {_MPA * asked.stress_pa:g} allowed"
     )
+    message = "; ".join(part for part in (stress, solved.message) if part)
     return replace(solved, status=Balanced.CONVERGED_ABOVE, message=message)
 
 
@@ -124,14 +125,16 @@ def _at(
     who = replace(person, passive=replace(person.passive, factor=factor))
     harder = replace(task, stress_pa=stress_pa)
     solved = solve_task(who, harder, options)
-    return HeldTask(solved, asked, who, harder, least_stress_pa(solved))
+    return HeldTask(solved, asked, who, harder, _least_pa(solved, options))
 
 
 def _not_held(last: HeldTask, person: Person, task: Task) -> HeldTask:
     """A task that all the stress of trunks does not hold: as it was asked for, and why."""
     asked, demand = last.asked, last.solved.demand
-    if asked.status is Balanced.CONVERGED:  # but for what may be left over
-        return HeldTask(asked, asked, person, task, last.least_pa)
+    if (
+        asked.status is not Balanced.BEYOND_STRENGTH
+    ):  # rounds that do not end say nothing of muscles
+        return HeldTask(asked, asked, person, task, None)
     if last.least_pa is None:
         freely = least_slack_forces(replace(demand, most=np.full(len(demand.most), np.inf)))
         slack, short_of = demand.required - demand.arms @ freely, "arms"
@@ -144,18 +147,21 @@ def _not_held(last: HeldTask, person: Person, task: Task) -> HeldTask:
             f"takes {_MPA * last.least_pa:.3g} MPa of muscle stress, most of all for {at}, "
             f"and trunks have {_MPA * HIGHEST_PA:g} at most"
         )
-    solved = replace(asked, message="; ".join(part for part in (asked.message, why) if part))
+    solved = replace(asked, message=f"{asked.message}; {why}")
     return HeldTask(solved, asked, person, task, last.least_pa, short_of, at)
 
 
 def _is_held(one: HeldTask, options: SolverOptions) -> bool:
-    """Whether muscles make all moments, but for what counts as balanced."""
-    return float(np.abs(one.solved.found.slack).max()) <= options.residual_nm
+    """Whether muscles make all moments, but for what may be left over."""
+    return float(np.abs(one.solved.found.slack).max()) <= options.slack_nm
 
 
-def least_stress_pa(solved: SolvedTask) -> float | None:
-    """Least largest active stress, Pa, that holds a task where the spine is; None: none does."""
-    return stress_needed(solved.demand, solved.stretched)
+def _least_pa(solved: SolvedTask, options: SolverOptions) -> float | None:
+    """Least stress, Pa, that holds a task where the spine is, if need be with what is left over."""
+    demand, slack = solved.demand, solved.found.slack
+    if np.abs(slack).max() <= options.slack_nm:
+        demand = replace(demand, required=demand.required - slack)
+    return stress_needed(demand, solved.stretched)
 
 
 def stress_needed(demand: Demand, stretched: Array) -> float | None:

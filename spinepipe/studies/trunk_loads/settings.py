@@ -134,8 +134,7 @@ class Solving(BaseModel):
         default=0.5,
         ge=0,
         le=10,
-        description="moment that may be left over before a task counts as beyond strength, after "
-        "more muscle stress was tried",
+        description="moment that may be left over before a task counts as beyond strength",
     )
     most_iterations: int = Field(default=60, ge=2, le=1000, description="rounds at most")
     stiffness_gain: float = Field(
