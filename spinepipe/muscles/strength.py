@@ -27,7 +27,7 @@ LOWEST_PA, HIGHEST_PA = _PEOPLE["range"]
 
 _EXTENSION = 2
 
-_ABOVE_LEAST, _STEP, _NEAR = 1.005, 1.01, 1.02
+_ABOVE_LEAST, _STEP, _NEAR = 1.01, 1.01, 1.03
 """Stress that is tried next over the least one of this posture; at least so much over one that did
 not do; and how near to it one that does is near enough."""
 

@@ -142,7 +142,7 @@ def test_a_task_beyond_the_stress_asked_for_is_held_at_the_least_that_does() -> 
     assert f"at {1e-6 * held.task.stress_pa:.2f} MPa of muscle stress" in held.solved.message
     assert held.short_of is None
     assert held.least_pa is not None
-    assert PA < held.least_pa <= held.task.stress_pa < 1.02 * held.least_pa
+    assert PA < held.least_pa <= held.task.stress_pa < 1.03 * held.least_pa
     assert held.solves <= 3
     # no forces at a little less, where the spine is
     demand, passive = held.solved.demand, held.solved.stretched
