@@ -88,6 +88,11 @@ class Rows(Panel):
             axes.set_xscale("log")
         if self.x_limits:
             axes.set_xlim(*self.x_limits)
+        else:  # open ends go to the edge, which lies beyond all symbols
+            columns = self.frame.columns.intersection(["value", "low", "high"])
+            told = self.frame[columns].to_numpy(float)
+            axes.update_datalim([(x, 0.0) for x in told[np.isfinite(told)]])
+            axes.autoscale_view(scaley=False)
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
             look = self.looks.get(one, SEVERAL[number % len(SEVERAL)])

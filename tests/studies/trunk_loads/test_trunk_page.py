@@ -405,7 +405,7 @@ def test_an_interval_that_is_open_above_is_told_as_such() -> None:
     assert "above" in f"{value}"
     light = says(case, "samples").text
     assert "90 of 690 samples are held by no muscle forces up to 1.3\u00a0MPa" in light
-    assert "3 of which are open" in light
+    assert "(open ends: 3 of compression)" in light
 
 
 def test_how_many_are_held_at_what_stress() -> None:
@@ -417,7 +417,8 @@ def test_how_many_are_held_at_what_stress() -> None:
     assert text.startswith("20 of 25 pairs of body and task are held at the muscle stress")
     assert "1 at more, up to 1.3\u00a0MPa" in text
     assert (
-        "4 are refused: 2 take more, 1 more than lever arms allow at any stress, 1 cannot" in text
+        "4 are refused: 2 take more, 1 ask for what lever arms make at no stress and 1 cannot"
+        in text
     )
 
 
