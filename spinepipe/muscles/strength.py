@@ -31,6 +31,9 @@ _ABOVE_LEAST, _STEP, _NEAR = 1.01, 1.01, 1.03
 """Stress that is tried next over the least one of this posture; at least so much over one that did
 not do; and how near to it one that does is near enough."""
 
+_FAR = 2.0
+"""Times what trunks have: no other posture makes up for so much."""
+
 _MOST_SOLVES = 8
 
 _NO_FINITE_PA = 1e9
@@ -49,7 +52,8 @@ class HeldTask:
     asked : at the stress that was asked for.
     person, task : at the stress of `solved`, for whatever is asked of them further.
     least_pa : least largest active stress that holds it, Pa, in the posture of `solved`; of a task
-        that is not held in the last one that was tried. None: no finite stress does.
+        that is not held in the last one that was tried. None: no finite stress does, or it was
+        not sought.
     short_of, short_at : what a task that is not held lacks, arms or strength, and the joint where
         most is lacking; else None.
     solves : how often the task was solved.
@@ -73,7 +77,7 @@ def hold_task(
     Parameters
     ----------
     seek_least : whether the least stress is sought where less than what was asked for does; else
-        it is that of the posture that was found.
+        it is not told there.
 
     Raises
     ------
@@ -81,17 +85,20 @@ def hold_task(
         For a load that the arms do not reach.
     """
     asked = solve_task(person, task, options)
-    now = HeldTask(asked, asked, person, task, _least_pa(asked, options))
+    now = HeldTask(asked, asked, person, task, None)
     # with L5S1 balanced alone, what other joints ask for is not to be made
     if options.lowest_alone or (_is_held(now, options) and not seek_least):
         return now
+    now = replace(now, least_pa=_least_pa(asked, options))
     best, too_little, solves = None, 0.0, 1
     while solves < _MOST_SOLVES:
-        stress = HIGHEST_PA if now.least_pa is None else _ABOVE_LEAST * now.least_pa
+        stress = np.inf if now.least_pa is None else _ABOVE_LEAST * now.least_pa
         if _is_held(now, options):
             best = now
         else:
             too_little = now.task.stress_pa
+            if stress > _FAR * HIGHEST_PA:
+                break
         stress = min(max(stress, _STEP * too_little), max(HIGHEST_PA, task.stress_pa))
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
             break

@@ -160,8 +160,8 @@ def test_least_stress_below_what_is_asked_for_changes_no_force() -> None:
     quick, sought = (hold_task(person, task, ASKED, seek) for seek in (False, True))
     assert quick.solved.status is sought.solved.status is Balanced.CONVERGED
     np.testing.assert_array_equal(quick.solved.found.forces, sought.solved.found.forces)
+    assert quick.least_pa is None
     assert sought.least_pa is not None
-    assert quick.least_pa == pytest.approx(sought.least_pa, rel=0.1)
     again = hold_task(person, replace(task, stress_pa=1.02 * sought.least_pa), ASKED)
     assert again.solved.status is not Balanced.BEYOND_STRENGTH
 
