@@ -192,6 +192,30 @@ class Uncertain(BaseModel):
         return self.samples * (len(self.factors) + 2)
 
 
+class Motions(BaseModel):
+    """Recorded lifts, frame by frame."""
+
+    model_config = FORM
+
+    trials: EachOnce[str] = Field(
+        default=(), description="recorded trials whose frames are tasks, of everyone who has them"
+    )
+    every: int = Field(default=1, ge=1, le=1000, description="take every so manieth frame")
+    largest_stress_mpa: float = Field(
+        default=1.0, gt=0, le=3, description="largest active stress of muscles"
+    )
+    samples: int = Field(
+        default=0,
+        ge=0,
+        le=10_000,
+        description="persons drawn for bands, by the factors of uncertain; 0: no bands. Hands are "
+        "where they were seen: their factor does not count",
+    )
+    samples_every: int = Field(
+        default=10, ge=1, le=1000, description="bands are of every so manieth frame that is taken"
+    )
+
+
 class VolunteerSettings(BaseModel):
     """The person whose pressures were measured, and what may be fitted to them."""
 
@@ -244,6 +268,7 @@ class TrunkLoads(Study):
         default=(), description="tasks whose muscles are drawn in 3-D; none named: the first"
     )
     uncertain: Uncertain = Field(default=Uncertain(), description="samples of persons and models")
+    motions: Motions = Field(default=Motions(), description="recorded lifts, frame by frame")
     volunteer: VolunteerSettings | None = Field(
         default=None, description="the person whose pressures were measured"
     )
