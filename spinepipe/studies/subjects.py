@@ -21,7 +21,7 @@ M_PER_INCH, M_PER_FOOT = 0.0254, 0.3048
 
 STANDARD_GRAVITY = 9.80665
 
-(SUBJECTS,) = read_forms(Path(__file__).with_name("forms.yaml")).values()
+SUBJECTS = read_forms(Path(__file__).with_name("forms.yaml"))["subjects"]
 
 
 def subject_of(cohort: Cohort, specimen: str) -> Subject:

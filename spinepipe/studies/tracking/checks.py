@@ -20,27 +20,13 @@ from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.skeleton import BODIES, MarkerSet
 from spinepipe.problems import InputError, InputProblem, Spelling, one_of
 from spinepipe.studies.places import unknown_names
+from spinepipe.studies.recordings import STANCE, TRIALS, read_recording, static_trial, trial_rows
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
 from spinepipe.studies.tracking.checks_of_markers import LoadedTrial
 from spinepipe.studies.tracking.checks_of_motion import motion_problems
-from spinepipe.studies.tracking.persons import (
-    marker_set,
-    ratios_of,
-    read_recording,
-    skeleton_in,
-    static_trial,
-    trial_of,
-    trial_rows,
-)
+from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in, trial_of
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
-from spinepipe.studies.tracking.trials import (
-    MARKER_SET,
-    PASSIVE,
-    RATIOS,
-    STANCE,
-    TRIALS,
-    source_kinds,
-)
+from spinepipe.studies.tracking.trials import MARKER_SET, PASSIVE, RATIOS, source_kinds
 from spinepipe.units import COORDINATES
 
 NEEDED = (SUBJECTS, TRIALS, MARKER_SET)

@@ -15,7 +15,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.motion.marker_groups import rigid_rotations, runs
 from spinepipe.motion.skeleton import PELVIS, MarkerSet, MarkerTrial
 from spinepipe.problems import InputProblem
-from spinepipe.studies.tracking.trials import STANCE
+from spinepipe.studies.recordings import STANCE
 from spinepipe.units import MM_PER_M
 
 LONGEST_GAP_S = 0.5

@@ -10,8 +10,9 @@ from spinepipe.frames import zxy_angles
 from spinepipe.motion.marker_groups import rigid_rotations
 from spinepipe.motion.reading import axes_of
 from spinepipe.problems import InputProblem
+from spinepipe.studies.recordings import STANCE
 from spinepipe.studies.tracking.checks_of_markers import LoadedTrial, marker_problems
-from spinepipe.studies.tracking.trials import MOVING, STANCE
+from spinepipe.studies.tracking.trials import MOVING
 from spinepipe.units import DEG_PER_RAD
 
 LIKE_THE_SET = (0.4, 2.5)

@@ -9,11 +9,11 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
-from spinepipe.studies.tracking.persons import motion_digests
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.trials import FORMS, approaches_on_trials, calibration_of
