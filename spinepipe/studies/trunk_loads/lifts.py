@@ -5,18 +5,18 @@ and joints are in balance with it frame by frame. A frame begins from the forces
 """
 
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion import skeleton
 from spinepipe.motion.recorded_motion import RecordedMotion
+from spinepipe.motion.standing_spine import StandingSpine, standing_spine
 from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions, solve_task
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.task import Instant, Task
@@ -24,6 +24,8 @@ from spinepipe.muscles.trunk import BODIES, LEVELS, body_of
 from spinepipe.progress import Progress
 from spinepipe.sensitivity_analysis.global_indices.design import draw
 from spinepipe.status import Balanced
+from spinepipe.studies.recorded_motion import recorded_motion
+from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.trunk_loads.persons import (
     UprightPerson,
     Values,
@@ -52,16 +54,22 @@ def run(root: str, study: str, specimen: str, trial: str, **paths: str) -> None:
     """Write the rows of a lift, a file for each table."""
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
-    motion = recorded_lift(cohort, specimen, trial)
     stands = UprightPerson.of_cohort(settings, cohort, specimen)
+    motion = recorded_motion(cohort, specimen, trial, spine_of(stands.person))
     rows = rows_of(settings, stands, motion, progress)
     place = {"specimen": specimen, "trial": trial}
-    others = [*extra_inputs(settings, cohort), *lift_digests(cohort, specimen)]
+    others = [*extra_inputs(settings, cohort), *motion_digests(cohort, specimen)]
     made_by = provenance("lift", settings, cohort, [specimen], others)
     for table in PER_LIFT:
         told = [place | row for row in rows[table.name]]
         whole = [{c.name: row.get(c.name) for c in table.columns} for row in told]
         write(from_rows(table, whole), paths[table.name], made_by)
+
+
+def spine_of(person: Person) -> StandingSpine:
+    """The spine whose joints and slices the muscles hold."""
+    trunk = person.lines.trunk
+    return standing_spine(person.subject, trunk, person.chain, person.upright, person.masses)
 
 
 def rows_of(
@@ -146,7 +154,8 @@ def held_in_turn(
 
 def _load_rows(outcome: TaskOutcome) -> Iterator[Row]:
     solved, pressure = outcome.solved, outcome.pressure
-    assert solved is not None and pressure is not None
+    assert solved is not None
+    assert pressure is not None
     active = (solved.found.forces - solved.stretched) / outcome.person.lines.trunk.muscles.pcsa
     of_all = {"highest_stress_mpa": 1e-6 * float(active.max()), "message": outcome.message}
     for row in level_rows(outcome):
