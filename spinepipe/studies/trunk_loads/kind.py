@@ -73,7 +73,7 @@ class TrunkFiles(StudyFiles):
             "charts_of_lifts:over_time",
             ("lift_loads", "lift_frames", "lift_bands"),
         ),
-        Figure("strength", "Strength that the model needs", "charts_of_trust:strength", ("tasks",)),
+        Figure("strength", "Muscle stress that tasks take", "charts_of_trust:strength", ("tasks",)),
         Figure(
             "drivers",
             "Where the spread of the loads comes from",

@@ -30,7 +30,7 @@ SHOWN: Mapping[Table, tuple[str, str]] = {
     TASKS: (
         "Loads by body and task",
         "specimen task l4l5_compression_n l4l5_pressure_mpa l4l5_shear_n l5s1_compression_n "
-        "l5s1_shear_n strength_used inside_eq_6 stable status message",
+        "l5s1_shear_n least_stress_mpa strength_used inside_eq_6 stable status message",
     ),
     PRESSURES: (
         "Computed and measured pressures",
@@ -42,7 +42,7 @@ SHOWN: Mapping[Table, tuple[str, str]] = {
     ),
     INTERVALS: (
         "Intervals of loads",
-        "specimen task quantity nominal low median high n_samples n_failed",
+        "specimen task quantity nominal low median high n_samples n_above n_failed",
     ),
     DRIVERS: (
         "Shares of the spread by input",

@@ -30,6 +30,15 @@ INPUTS = {
 }
 """Uncertain inputs, three words at most."""
 
+STANDING = {
+    "held": "is not held",
+    "strong": "takes {share:unit} of the strength",
+    "toned": "needs {tone:unit} muscle tone to be stable",
+    "falls": "is not stable at any muscle tone",
+    "unsought": "is not stable without muscle tone",
+}
+"""What relaxed standing lacks."""
+
 SIMPLIFIED = {
     "no_feedback": "leaving the spine undeformed",
     "rigid_translations": "joints that only turn",
