@@ -5,8 +5,9 @@ iliac spines (ASI, PSI); on the thorax over C7, T10, the jugular notch (CLAV), t
 and the right shoulder blade (RBAK); four around the head; on each arm over the acromion (SHO), the
 outer epicondyle (ELB), both styloids (WRA, WRB) and the knuckle of the second finger (FIN).
 
-Where joints are inside, regressions tell that were made for these landmarks (`facts.csv`): the
-centre of L5S1 by the width of the pelvis, that of the shoulder by the depth of the thorax.
+`PLACES` are rough: they tell names that are exchanged, and no motion. Where joints are inside,
+regressions tell that were made for these landmarks (`facts.csv`): the centre of L5S1 by the width
+of the pelvis, that of the shoulder by the depth of the thorax.
 """
 
 import re
@@ -30,7 +31,10 @@ ARMS = tuple(side + name for side in "LR" for name in ("SHO", "ELB", "WRA", "WRB
 NEEDED = (*PELVIS, "C7", "T10", "CLAV", "STRN", *HEAD, *ARMS)
 """RBAK tells left from right where markers are looked at; it may be left out."""
 
-L5S1_OF_WIDTH = several(__name__, "l5s1_over_pelvis_width")
+PLACES = several(__name__, "plug_in_gait_place")
+"""Where markers of the trunk are on somebody who stands, of body height from L5S1."""
+
+L5S1_OF_WIDTH = several(__name__, "lumbosacral_over_pelvis_width")
 """Forwards and up from the middle between both anterior spines, by sex."""
 
 SHOULDER_OF_DEPTH = several(__name__, "shoulder_over_thorax_depth")[""]

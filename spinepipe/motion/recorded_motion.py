@@ -75,6 +75,7 @@ class RecordedMotion:
     rotations : (F, 18, 3, 3) of `BODIES` in ground: how far each is turned from standing upright.
     standing : (18, 3, 3) the same in the stance trial, where it is none.
     loads : with inertia. still : at the same places as if nothing were accelerated.
+    lift_off_s : when hands bear half of what they lift; None where they do so all the time.
     """
 
     name: str
@@ -85,6 +86,7 @@ class RecordedMotion:
     standing: Array
     loads: CarriedLoads
     still: CarriedLoads
+    lift_off_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +141,8 @@ def move(
     ]
     loads, still = carried_loads(parts, load, step_s)
     standing = np.broadcast_to(np.eye(3), (len(BODIES), 3, 3))
-    return RecordedMotion(name, time_s, l5s1, joints, bodies, standing, loads, still)
+    lift_off = None if load is None or load.lift_off is None else float(time_s[load.lift_off])
+    return RecordedMotion(name, time_s, l5s1, joints, bodies, standing, loads, still, lift_off)
 
 
 def shared_rotations(pelvis: Array, thorax: Array, shares: Array) -> Array:

@@ -13,9 +13,14 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.motion.body_segments import RigidPart, cylinder
 from spinepipe.motion.skeleton import BODIES, JOINTS
-from spinepipe.muscles.pose import JointCentres, place_bodies, rotations_of
-from spinepipe.muscles.subject import Subject
+from spinepipe.muscles.masses import masses_of
+from spinepipe.muscles.pose import BEHIND_MM, JointCentres, place_bodies, rotations_of
+from spinepipe.muscles.regressions import packaged
+from spinepipe.muscles.scaling import scale_trunk
+from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.trunk import LEVELS, SLICES, Mass, Trunk, body_of
+from spinepipe.muscles.upright import USUAL_START_DEG
+from spinepipe.units import MM_PER_M
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +37,18 @@ class StandingSpine:
     subject: Subject
     joints: Array
     slices: tuple[RigidPart, ...]
+
+
+def usual_spine(subject: Subject, source: Trunk) -> StandingSpine:
+    """The spine of a person of whom sex, age, height and mass are known, of a reference trunk.
+
+    The person stands where the search for an upright posture begins, in which muscles have a say.
+    """
+    trunk = scale_trunk(source, subject, REFERENCE, packaged())
+    upright = np.zeros((len(USUAL_START_DEG), 3))
+    upright[:, 0] = np.deg2rad(USUAL_START_DEG)
+    chain = JointCentres.of(trunk, BEHIND_MM / MM_PER_M)
+    return standing_spine(subject, trunk, chain, upright, masses_of(trunk, subject))
 
 
 def standing_spine(

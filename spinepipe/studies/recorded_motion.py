@@ -7,7 +7,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
-from spinepipe.motion.joint_tables import ratio_sets
+from spinepipe.motion.joint_tables import USUAL_SHARES, ratio_sets
 from spinepipe.motion.lifted_load import LiftedLoad, borne_by_height, borne_by_plates
 from spinepipe.motion.plug_in_gait import NEEDED, marker_places
 from spinepipe.motion.recorded_motion import RecordedMotion, move
@@ -18,6 +18,7 @@ from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.recordings import (
     BOX,
     FORCE_PLATES,
+    STANCE,
     TRIALS,
     Row,
     of_specimen,
@@ -26,8 +27,6 @@ from spinepipe.studies.recordings import (
     trial_rows,
 )
 from spinepipe.units import MM_PER_M
-
-USUAL_SHARES = "christophy_2012"
 
 EVEN = 0.01
 """Share by which steps of time may differ."""
@@ -57,14 +56,35 @@ def recorded_motion(
     """
     rows = {str(row["trial"]): row for row in trial_rows(cohort, specimen)}
     still = static_trial(cohort, specimen)
-    table = f"{cohort.name}/{TRIALS.file}"
     if trial not in rows or still is None:
-        lacking = trial if still else "stance"
+        lacking = trial if still else STANCE
         found, allowed = f"no trial {lacking} of '{specimen}'", f"one of {', '.join(rows)}"
         remedy = "name another" if still else "add a trial of kind stance, or mark one static"
+        table = f"{cohort.name}/{TRIALS.file}"
         raise InputError([InputProblem(table, None, "trial", found, allowed, remedy)])
-    row, stance = rows[trial], _places(rows[still], cohort)[1]
-    time_s, raw = _places(row, cohort)
+    _, stance = places_of(rows[still], cohort)
+    time_s, places = smooth_places(rows[trial], cohort, cutoff_hz)
+    return move(
+        trial,
+        time_s,
+        spine,
+        ratio_sets()[USUAL_SHARES] if shares is None else shares,
+        {name: at.mean(axis=0) for name, at in stance.items()},
+        places,
+        lifted_load(cohort, specimen, rows[trial], time_s, places, cutoff_hz),
+    )
+
+
+def smooth_places(row: Row, cohort: Cohort, cutoff_hz: float) -> tuple[Array, dict[str, Array]]:
+    """Times (F,) s and filtered places (F, 3) m of the markers of the set in a trial.
+
+    Raises
+    ------
+    InputError
+        Of frames that cannot be filtered, besides what `places_of` raises.
+    """
+    time_s, raw = places_of(row, cohort)
+    table = f"{cohort.name}/{TRIALS.file}"
     steps = np.diff(time_s)
     if len(steps) == 0 or np.ptp(steps) > EVEN * steps.mean():
         found, allowed = "frames that are not evenly spaced in time", "one step between all frames"
@@ -77,15 +97,7 @@ def recorded_motion(
         allowed, remedy = "a trial that can be filtered", "record longer, or lower the cutoff"
         problem = InputProblem(table, row["line"], "file", str(why), allowed, remedy)
         raise InputError([problem]) from why
-    return move(
-        trial,
-        time_s,
-        spine,
-        ratio_sets()[USUAL_SHARES] if shares is None else shares,
-        {name: at.mean(axis=0) for name, at in stance.items()},
-        places,
-        lifted_load(cohort, specimen, row, time_s, places, cutoff_hz),
-    )
+    return time_s, places
 
 
 def lifted_load(
@@ -131,8 +143,14 @@ def lifted_load(
     return LiftedLoad(kg, at, borne)
 
 
-def _places(row: Row, cohort: Cohort) -> tuple[Array, dict[str, Array]]:
-    """Times (F,) s and places (F, 3) m of the markers of the set; gaps are straight lines."""
+def places_of(row: Row, cohort: Cohort) -> tuple[Array, dict[str, Array]]:
+    """Times (F,) s and places (F, 3) m of the markers of the set; gaps are straight lines.
+
+    Raises
+    ------
+    InputError
+        Of a file that cannot be read, or that lacks markers.
+    """
     read = read_recording(row, cohort.name, cohort.folder)
     at = marker_places(read.names)
     lacking = list(_lacking(f"{cohort.name}/{row['file']}", read, at))

@@ -23,6 +23,8 @@ RECORDED = TRIALS, FORCE_PLATES, BOX, MEASURED_MOMENTS = tuple(
 )
 
 STANCE = "stance"
+MOVING = ("flexion_extension", "lateral_bending", "axial_rotation")
+"""Kinds of trials that move, in the order of the rotation that they are about."""
 
 Row = Mapping[Any, Any]
 """Cells of a row by their columns."""

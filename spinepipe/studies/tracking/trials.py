@@ -7,11 +7,9 @@ from pathlib import Path
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import read_forms
-from spinepipe.studies.recordings import RECORDED, STANCE, TRIALS
+from spinepipe.muscles.myo_sim import origin_of_myo_sim
+from spinepipe.studies.recordings import MOVING, RECORDED, STANCE, TRIALS, motion_digests
 from spinepipe.studies.tracking.settings import LEARNT, OWN, Approach, Tracking
-
-MOVING = ("flexion_extension", "lateral_bending", "axial_rotation")
-"""Kinds of trials that move, in the order of the rotation that they are about."""
 
 AXIS = {kind: axis for axis, kind in enumerate(MOVING)}
 """Rotation that a kind of motion is about, among extension, right bending and left rotation."""
@@ -28,6 +26,12 @@ BOTH = ("flexion_extension", "lateral_bending")
 
 _CALIBRATED_ON: dict[str, str] = {kind: name for name, kind in LEARNT.items() if kind != "both"}
 """Name of the calibration on trials of a kind alone, where it has one of its own."""
+
+
+def digests_of_lifts(cohort: Cohort) -> list[str]:
+    """What net moments hang on besides tables: files of motion, and the trunk given to persons."""
+    found = [one for name in cohort.specimen_names for one in motion_digests(cohort, name)]
+    return [*found, origin_of_myo_sim().sha256]
 
 
 def kinds_of_trials(cohort: Cohort) -> dict[tuple[str, str], str]:
