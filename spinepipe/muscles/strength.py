@@ -66,7 +66,11 @@ class HeldTask:
 
 
 def hold_task(
-    person: Person, task: Task, options: SolverOptions, seek_least: bool = False
+    person: Person,
+    task: Task,
+    options: SolverOptions,
+    seek_least: bool = False,
+    nearby: SolvedTask | None = None,
 ) -> HeldTask:
     """A task with the forces that hold it, at the stress asked for or the least above that does.
 
@@ -74,13 +78,14 @@ def hold_task(
     ----------
     seek_least : whether the least stress is sought where less than what was asked for does; else
         it is that of the posture that was found.
+    nearby : a task much like it, such as the frame before, whose forces shorten the way.
 
     Raises
     ------
     ValueError
         For a load that the arms do not reach.
     """
-    asked = solve_task(person, task, options)
+    asked = solve_task(person, task, options, nearby=nearby)
     now = HeldTask(asked, asked, person, task, least_stress_pa(asked))
     # with L5S1 balanced alone, what other joints ask for is not to be made
     if options.lowest_alone or (_is_held(now, options) and not seek_least):
@@ -95,7 +100,7 @@ def hold_task(
         stress = min(max(stress, _STEP * too_little), max(HIGHEST_PA, task.stress_pa))
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
             break
-        now, solves = _at(person, task, stress, options, asked), solves + 1
+        now, solves = _at(person, task, stress, options, now), solves + 1
     if best is None:
         return replace(_not_held(now, person, task), solves=solves)
     least = min(best.task.stress_pa, best.least_pa or np.inf)
@@ -116,15 +121,15 @@ def above_asked(solved: SolvedTask, asked: Task, held: Task) -> SolvedTask:
 
 
 def _at(
-    person: Person, task: Task, stress_pa: float, options: SolverOptions, asked: SolvedTask
+    person: Person, task: Task, stress_pa: float, options: SolverOptions, before: HeldTask
 ) -> HeldTask:
     """The task at another stress, stretched tissue as it was."""
     # the force of what is stretched is told in shares of strength
     factor = person.passive.factor * task.stress_pa / stress_pa
     who = replace(person, passive=replace(person.passive, factor=factor))
     harder = replace(task, stress_pa=stress_pa)
-    solved = solve_task(who, harder, options)
-    return HeldTask(solved, asked, who, harder, least_stress_pa(solved))
+    solved = solve_task(who, harder, options, nearby=before.solved)
+    return HeldTask(solved, before.asked, who, harder, least_stress_pa(solved))
 
 
 def _not_held(last: HeldTask, person: Person, task: Task) -> HeldTask:

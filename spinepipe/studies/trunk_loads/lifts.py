@@ -17,13 +17,14 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion import skeleton
 from spinepipe.motion.recorded_motion import RecordedMotion
 from spinepipe.motion.standing_spine import StandingSpine, standing_spine
-from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions, solve_task
+from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions
 from spinepipe.muscles.person import Person
+from spinepipe.muscles.strength import HeldTask, hold_task
 from spinepipe.muscles.task import Instant, Task
 from spinepipe.muscles.trunk import BODIES, LEVELS, body_of
 from spinepipe.progress import Progress
 from spinepipe.sensitivity_analysis.global_indices.design import draw
-from spinepipe.status import Balanced
+from spinepipe.status import HELD
 from spinepipe.studies.recorded_motion import recorded_motion
 from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.trunk_loads.persons import (
@@ -81,8 +82,8 @@ def rows_of(
     tasks = tasks_of(motion, frames, 1e6 * asked.largest_stress_mpa)
     person, found = stands.person, dict[str, list[Row]]()
     outcomes = [
-        TaskOutcome(person, task, solved, solved.message)
-        for task, solved in zip(tasks, held_in_turn(person, tasks, options), strict=True)
+        TaskOutcome(person, task, one.solved, one.solved.message, held=one)
+        for task, one in zip(tasks, held_in_turn(person, tasks, options), strict=True)
     ]
     times = motion.time_s[frames].tolist()
     found["lift_loads"] = [
@@ -144,20 +145,21 @@ def tasks_of(
 
 def held_in_turn(
     person: Person, tasks: Sequence[Task], options: SolverOptions
-) -> Iterator[SolvedTask]:
+) -> Iterator[HeldTask]:
     """Tasks that follow each other closely, each begun where the one before ended."""
     before = None
     for task in tasks:
-        before = solve_task(person, task, options, nearby=before)
-        yield before
+        held = hold_task(person, task, options, nearby=before)
+        before = held.solved
+        yield held
 
 
 def _load_rows(outcome: TaskOutcome) -> Iterator[Row]:
     solved, pressure = outcome.solved, outcome.pressure
     assert solved is not None
     assert pressure is not None
-    active = (solved.found.forces - solved.stretched) / outcome.person.lines.trunk.muscles.pcsa
-    of_all = {"highest_stress_mpa": 1e-6 * float(active.max()), "message": outcome.message}
+    least = outcome.held.least_pa if outcome.held else None
+    of_all = {"least_stress_mpa": least and 1e-6 * least, "message": outcome.message}
     for row in level_rows(outcome):
         own = {"pressure_mpa": 1e-6 * pressure.pa} if row["level"] == LEVELS[L4L5] else {}
         yield row | of_all | own
@@ -179,7 +181,7 @@ def _frame_rows(
 
 def _compression(solved: SolvedTask | None) -> float:
     """N, of L4L5; of frames that are not held nought."""
-    held = solved is not None and solved.status is Balanced.CONVERGED
+    held = solved is not None and solved.status in HELD
     return float(solved.compression[L4L5]) if held else 0.0
 
 
@@ -202,9 +204,9 @@ def _samples(
         person = stands.varied(values)
         sized = of_mass(motion, person.subject.mass_kg / stands.subject.mass_kg)
         tasks = tasks_of(sized, frames, 1e6 * asked.largest_stress_mpa, values)
-        solved = list(held_in_turn(person, tasks, options))
+        solved = [one.solved for one in held_in_turn(person, tasks, options)]
         found.append([one.compression for one in solved])
-        held.append([one.status is Balanced.CONVERGED for one in solved])
+        held.append([one.status in HELD for one in solved])
     shape = (len(found), len(frames))
     return np.reshape(found, (*shape, len(LEVELS))), np.reshape(held, shape).astype(bool)
 

@@ -202,7 +202,11 @@ class Motions(BaseModel):
     )
     every: int = Field(default=1, ge=1, le=1000, description="take every so manieth frame")
     largest_stress_mpa: float = Field(
-        default=1.0, gt=0, le=3, description="largest active stress of muscles"
+        default=0.6,
+        gt=0,
+        le=3,
+        description="largest active stress of muscles; what it does not hold is held at the least "
+        "that does, as far as trunks have it",
     )
     samples: int = Field(
         default=0,
