@@ -30,7 +30,7 @@ class StandingSpine:
     Attributes
     ----------
     subject : sex, age, height, mass.
-    joints : (17, 3) m, about which the bodies turn, as `JOINTS`.
+    joints : (17, 3) m, centres of the discs, as `JOINTS`: moments are told about these.
     slices : (17,) of the trunk, L5 to T1 as `BODIES`; inertia in ground axes.
     """
 
@@ -58,7 +58,7 @@ def standing_spine(
 
     Parameters
     ----------
-    trunk : at the person's size. chain : its joints.
+    trunk : at the person's size. chain : about which its bodies turned until they stood upright.
     upright : (8, 3) rad, how the person stands, from the source's pose.
     masses : of `spinepipe.muscles.masses.masses_of`; the head, which has markers, is left out.
     """
@@ -68,7 +68,7 @@ def standing_spine(
     bodies = np.array([body_of(name) for name in above], dtype=np.int64)
     vertebrae = poses.of(bodies, trunk.vertebrae[[SLICES.index(name) for name in above]])
     joints = np.empty((len(JOINTS), 3))
-    joints[: len(LEVELS)] = poses.centres
+    joints[: len(LEVELS)] = poses.of(np.arange(len(LEVELS)), trunk.joints)
     joints[len(LEVELS) :] = 0.5 * (vertebrae[len(LEVELS) - 1 : -1] + vertebrae[len(LEVELS) :])
     own = {mass.name.removeprefix("slice_"): mass for mass in masses}
     centres = poses.of(bodies, np.array([own[name].at for name in above]))
@@ -77,9 +77,9 @@ def standing_spine(
     axes = np.vstack([axes, axes[-1:]])
     return StandingSpine(
         subject,
-        joints,
+        joints - joints[0],
         tuple(
-            RigidPart(name, own[name].kg, centre, cylinder(axis, own[name].kg, name))
+            RigidPart(name, own[name].kg, centre - joints[0], cylinder(axis, own[name].kg, name))
             for name, centre, axis in zip(above, centres, axes, strict=True)
         ),
     )

@@ -68,12 +68,11 @@ def _compared(
     names = names | {"trials": count(len(moving), "trial")}
     agrees = worst["rmse"].number <= AGREES_NM and worst["peak"].number <= AGREES_PERCENT
     yield Conclusion("moment", "agrees" if agrees else "differs", values | worst, names)
-    yield Conclusion("course", "told", worst, names)
-    yield Conclusion("peak", "told", {"peak": worst["peak"]}, names)
+    yield Conclusion("course", "told", {"value": worst["rmse"]}, names)
+    yield Conclusion("peak", "told", {"value": worst["peak"]}, names)
     before = moving["before_nm"].dropna()
     if len(before):
-        # where weight and measured moment differ before anything is lifted, the body is off
-        held = {"before": Value(float(before.max()), "N m", source=source)}
+        held = {"value": Value(float(before.max()), "N m", source=source)}
         yield Conclusion("before", "told", held, names)
     yield Conclusion("quasi_static", "less", values | worst, names)
     ok = "ok" if agrees else "check"
