@@ -116,15 +116,13 @@ class TrunkFiles(StudyFiles):
     @classmethod
     def of(cls, study: TrunkLoads, cohort: Cohort) -> "TrunkFiles":
         """The files of a study of a cohort."""
-        names, asked = cohort.specimen_names, study.motions.trials
-        trials = cohort.further.get("trials")
+        names, trials = cohort.specimen_names, cohort.further.get("trials")
+        known = (
+            set() if trials is None else set(zip(trials["specimen"], trials["trial"], strict=True))
+        )
         lifts = {
-            name: tuple(
-                one
-                for one in asked
-                if ((trials[["specimen", "trial"]] == (name, one)).all(axis=1)).any()
-            )
-            for name in (names if asked and trials is not None else ())
+            name: tuple(trial for trial in study.motions.trials if (name, trial) in known)
+            for name in names
         }
         shown = reproduces(cohort.name) and beside()
         return cls(study, names, shown, "tasks" in cohort.further, lifts)

@@ -99,7 +99,7 @@ def rows_of(
     ]
     sampled = sorted({*range(0, len(frames), asked.samples_every), peak})
     known = _samples(settings, stands, motion, frames[sampled], progress)
-    found["lift_bands"] = list(_band_rows(motion.time_s[frames[sampled]], *known))
+    found["lift_bands"] = list(band_rows(motion.time_s[frames[sampled]], *known))
     return found
 
 
@@ -221,7 +221,7 @@ def of_mass(motion: RecordedMotion, times: float) -> RecordedMotion:
     )
 
 
-def _band_rows(times: Array, compression: Array, held: Array) -> Iterator[Row]:
+def band_rows(times: Array, compression: Array, held: Array) -> Iterator[Row]:
     if not len(held):
         return
     for k, time in enumerate(times.tolist()):
