@@ -7,6 +7,7 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import plain
+from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.lift_rows import (
     GUIDELINE_N,
     L4L5,
@@ -38,7 +39,7 @@ def of_lifts(
         return
     found = [one for one in (largest_load(tables, *lift) for lift in lifts) if one is not None]
     yield from _largest(found, tables["lift_loads"], alone)
-    yield from _held(tables["lift_loads"])
+    yield from _held(tables["lift_loads"], study.motions.largest_stress_mpa)
     yield from _bands(tables.get("lift_bands", pd.DataFrame()))
     if len(found) > 1:
         ends = [float(one.row["compression_n"]) for one in found]
@@ -102,14 +103,17 @@ def _frames(loads: pd.DataFrame) -> int:
     return int((loads["level"] == L4L5).sum())
 
 
-def _held(loads: pd.DataFrame) -> Iterator[Conclusion]:
+def _held(loads: pd.DataFrame, asked_mpa: float) -> Iterator[Conclusion]:
     """Whether muscles hold every frame."""
     rows = loads[loads["level"] == L4L5]
     lost = rows[~sound(rows)]
     values = numbers_from("lift_loads: status", frames=len(rows), lost=len(lost))
     if lost.empty:
-        most = Value(float(rows["highest_stress_mpa"].max()), "MPa", source="lift_loads")
-        yield Conclusion("lift_held", "ok", values | {"stress": most})
+        above = rows["status"] == Balanced.CONVERGED_ABOVE
+        most = Value(float(rows["least_stress_mpa"].max()), "MPa", source="lift_loads")
+        values |= numbers_from("lift_loads: status", above=int(above.sum()))
+        values |= {"stress": most, "asked": Value(asked_mpa, "MPa", source="settings: motions")}
+        yield Conclusion("lift_held", "check_above" if above.any() else "ok", values)
         return
     words = lost["message"].replace("", pd.NA).dropna()
     names = {"why": str(words.mode().iloc[0]) if len(words) else "they did not converge"}
