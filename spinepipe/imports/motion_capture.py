@@ -35,7 +35,7 @@ from spinepipe.motion.reading import axes_of, read_motion
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
-from spinepipe.studies.subjects import STANDARD_GRAVITY
+from spinepipe.units import GRAVITY_M_S2
 
 MADE = ("cohort.yaml", "specimens.csv", "subjects.csv", "trials.csv", "datapackage.json")
 
@@ -241,7 +241,7 @@ def _other_weight(
     for axis, one in product("xyz", parts.values()):
         force = one.get(f"f{axis}_n", np.zeros(0))
         read = force[np.isfinite(force)]
-        shares[axis] += float(read.sum()) / max(len(read), 1) / (kg * STANDARD_GRAVITY)
+        shares[axis] += float(read.sum()) / max(len(read), 1) / (kg * GRAVITY_M_S2)
     for axis, factor, remedy in (
         ("y", -1.0, "do they act on the other side? correct `acts_on`"),
         ("y", 1e3, "are they in kN? correct `columns`"),

@@ -13,6 +13,7 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.applied_loads import AppliedLoads, applied_loads
 from spinepipe.muscles.forces import Demand, Forces, least_stress
+from spinepipe.muscles.passive_tissue import LIGAMENT_ARM_M
 from spinepipe.muscles.paths import Pulls
 from spinepipe.muscles.person import Person, above
 from spinepipe.muscles.pose import BodyPoses, place_bodies, rotations_of
@@ -30,6 +31,9 @@ _HEAVY_N = 3000.0
 
 _LOWEST = 3
 """Rows of L5S1 in a demand."""
+
+_ALONG, _EXTENSION = 1, 2
+"""Axes of a disc."""
 
 
 @dataclass(frozen=True)
@@ -122,10 +126,12 @@ class TurnedPose:
     Attributes
     ----------
     poses : without translations. unpressed : (7, 3) N m of joints without compression, disc axes.
+    ligaments : (7,) N m of what lies behind the joints, extension positive.
     """
 
     poses: BodyPoses
     unpressed: Array
+    ligaments: Array
 
     @classmethod
     def of(cls, person: Person, task: Task) -> "TurnedPose":
@@ -135,7 +141,8 @@ class TurnedPose:
         else:
             rotations = task.instant.turned @ rotations_of(person.chain, person.upright)
         poses = place_bodies(person.chain, rotations, np.zeros((len(LEVELS), 3)))
-        return cls(poses, person.laws.moments(poses.turned, np.zeros(len(LEVELS))))
+        unpressed = person.laws.moments(poses.turned, np.zeros(len(LEVELS)))
+        return cls(poses, unpressed, person.laws.ligament_moments(poses.turned))
 
 
 def solve_task(
@@ -277,6 +284,7 @@ def _solve_round(
     loads = applied_loads(person, task, poses)
     stiffening = person.laws.stiffening(-pushes[:, 1])
     joint = stiffening[:, None] * turned.unpressed
+    joint[:, _EXTENSION] += turned.ligaments
     # what loads and joints leave to the muscles, and what these can make
     weights, turning = above(loads.forces, loads.moments, poses.centres)
     required = -(turning + np.einsum("kij,kj->ki", poses.discs, joint))
@@ -304,6 +312,8 @@ def _solve_round(
     # what is above a joint is carried by it: weights, and all fascicles that cross it
     on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
     on_discs = np.einsum("kji,kj->ki", poses.discs, on_joints)
+    # ligaments pull the vertebrae together behind the joint
+    on_discs[:, _ALONG] -= turned.ligaments / LIGAMENT_ARM_M
     return SolvedTask(
         *(Balanced.CONVERGED, "", poses, pulls, loads, demand, found),
         *(stretched, on_discs, joint, stiffening),

@@ -70,8 +70,23 @@ class Passive(BaseModel):
     rotation_factor: float = Field(
         default=1.0, gt=0, le=10, description="factor of all moments of joints"
     )
+    t11t12: Literal["segment_wilke", "as_t12l1"] = Field(
+        default="segment_wilke",
+        description="T11T12: whole segment with its rib joints (Wilke 2017), or as T12L1 by its "
+        "disc",
+    )
     t11t12_bending_factor: float = Field(
-        default=1.2, gt=0, le=10, description="of T11T12, for the rib cage (Ghezelbash 2016 2.1)"
+        default=1.2,
+        gt=0,
+        le=10,
+        description="of T11T12 as T12L1, for the rib cage (Ghezelbash 2016 2.1)",
+    )
+    ligaments_nm: float = Field(
+        default=95.0,
+        ge=0,
+        le=300,
+        description="moment of ligaments and fascia behind L5S1 in full flexion, of a man, beside "
+        "disc and stretched muscles (Dolan 1994); 0: none",
     )
     joints_behind_mm: float = Field(
         default=4.0,
