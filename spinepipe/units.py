@@ -20,7 +20,8 @@ COORDINATES = (
 TRANSLATIONS = COORDINATES[:3]
 ROTATIONS = COORDINATES[3:]
 
-STANDARD_GRAVITY = np.array([0.0, -9.81, 0.0])
+GRAVITY_M_S2 = 9.81
+STANDARD_GRAVITY = np.array([0.0, -GRAVITY_M_S2, 0.0])
 """m/s2 in ground axes: y points up."""
 
 MM_PER_M = 1000.0

@@ -11,7 +11,7 @@ MASS_PERCENT: Mapping[str, float] = numbers(__name__, "segment_mass_percent")
 """Of body mass, by segment and sex (`hand male`); of arms one side."""
 
 CENTRE: Mapping[str, float] = numbers(__name__, "segment_centre")
-"""Centre of mass from the upper end of an arm's segment, share of its length."""
+"""Centre of mass from the upper end of the head or an arm's segment, share of its length."""
 
 LENGTH_M: Mapping[str, float] = numbers(__name__, "segment_length")
 """Of persons of `HEIGHT_M`."""

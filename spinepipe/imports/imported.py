@@ -29,7 +29,7 @@ from spinepipe.studies.registry import every_form
 from spinepipe.units import MM_PER_M
 
 CARRIED = read_forms(Path(__file__).with_name("forms.yaml"))
-"""Tables that an import writes and that no study reads yet, by stem."""
+"""Tables that an import writes and that no study reads, by stem."""
 
 
 @cache

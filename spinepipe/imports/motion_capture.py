@@ -17,7 +17,6 @@ from spinepipe.documents.settings import validate
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.effects.contract import Array
 from spinepipe.imports.imported import (
-    CARRIED,
     AxesText,
     ImportedCohort,
     ImportSettings,
@@ -36,7 +35,7 @@ from spinepipe.motion.reading import axes_of, read_motion
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.report.words import count, listed
-from spinepipe.studies.subjects import STANDARD_GRAVITY
+from spinepipe.units import GRAVITY_M_S2
 
 MADE = ("cohort.yaml", "specimens.csv", "subjects.csv", "trials.csv", "datapackage.json")
 
@@ -67,6 +66,7 @@ class Trial(BaseModel):
     arms: Literal["hanging", "behind_head", "crossed"] = Field(description="where the arms were")
     start_s: float | None = Field(default=None, description="what is before is cut off")
     end_s: float | None = Field(default=None, description="what is after is cut off")
+    load_kg: float | None = Field(default=None, gt=0, le=200, description="what both hands lift")
     shift_s: float = Field(
         default=0.0,
         description="what is added to times of its tables, but of a .c3d, to give the markers'",
@@ -177,10 +177,14 @@ def imported(folder: Path, document: YamlDocument) -> ImportedCohort:
         (p.specimen, p.sex, *map(rounded, (p.age_years, 100.0 * p.height_m, p.mass_kg)))
         for p in settings.persons
     ]
+    # the column of loads is there where somebody lifts one
+    loads = slice(2, 3 if any(t.load_kg for t in settings.trials) else 2)
     trials = [
-        (t.specimen, t.trial, t.kind, name, *ends, settings.axes, t.arms)
+        (t.specimen, t.trial, t.kind, name, *numbers[:2], settings.axes, t.arms, *numbers[loads])
         for t, name in zip(settings.trials, names, strict=True)
-        for ends in (["" if one is None else rounded(one) for one in (t.start_s, t.end_s)],)
+        for numbers in (
+            ["" if one is None else rounded(one) for one in (t.start_s, t.end_s, t.load_kg)],
+        )
     ]
     tables = {"specimens": [one[:1] for one in people], "subjects": people, "trials": trials}
     persons = [place(f"persons.{k}")[:2] for k in range(len(people))]
@@ -201,7 +205,7 @@ def _rows(
     }
     for k in range(len(values["time_s"])):
         cells = {name: rounded(one[k]) for name, one in values.items() if np.isfinite(one[k])}
-        yield tuple((fixed | cells).get(name, "") for name in CARRIED[of.table].names)
+        yield tuple((fixed | cells).get(name, "") for name in all_forms()[of.table].names)
 
 
 def _other_unit(
@@ -237,7 +241,7 @@ def _other_weight(
     for axis, one in product("xyz", parts.values()):
         force = one.get(f"f{axis}_n", np.zeros(0))
         read = force[np.isfinite(force)]
-        shares[axis] += float(read.sum()) / max(len(read), 1) / (kg * STANDARD_GRAVITY)
+        shares[axis] += float(read.sum()) / max(len(read), 1) / (kg * GRAVITY_M_S2)
     for axis, factor, remedy in (
         ("y", -1.0, "do they act on the other side? correct `acts_on`"),
         ("y", 1e3, "are they in kN? correct `columns`"),

@@ -14,7 +14,7 @@ from pydantic import BaseModel, Field
 
 from spinepipe.cohort.cohort import FORM
 from spinepipe.effects.contract import Array
-from spinepipe.imports.imported import CARRIED
+from spinepipe.imports.imported import all_forms
 from spinepipe.motion.reading_plates import read_force_plates
 from spinepipe.motion.reading_text import NumberBlock, text_of
 from spinepipe.problems import InputError, InputProblem, did_you_mean, one_of
@@ -74,7 +74,9 @@ class RecordedTable(BaseModel):
 def misnamed_columns(place: Place, of: RecordedTable) -> Iterator[InputProblem]:
     """Names of columns that such a table has not or has twice; loads not told on what they act."""
     meant = list[tuple[str, str]]()
-    allowed = [name for name, (ours, _) in QUANTITIES.items() if ours in CARRIED[of.table].names]
+    allowed = [
+        name for name, (ours, _) in QUANTITIES.items() if ours in all_forms()[of.table].names
+    ]
     for text in [one for one in of.columns if one != "-"]:
         part, _, name = text.rpartition(".")
         if name not in allowed or bool(part) > (of.table == "force_plates"):

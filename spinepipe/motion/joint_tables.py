@@ -42,6 +42,9 @@ ENDS = ("low", "high")
 
 RATIOS_FILE = "ratios.csv"
 
+USUAL_SHARES = "christophy_2012"
+"""Set of ratios that is confirmed."""
+
 SUM_DIFFERS = 2e-3
 """By how much shares may miss 1: seventeen of them, rounded to four digits."""
 

@@ -13,6 +13,7 @@ import numpy as np
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.applied_loads import AppliedLoads, applied_loads
 from spinepipe.muscles.forces import Demand, Forces, least_stress
+from spinepipe.muscles.passive_tissue import LIGAMENT_ARM_M
 from spinepipe.muscles.paths import Pulls
 from spinepipe.muscles.person import Person, above
 from spinepipe.muscles.pose import BodyPoses, place_bodies, rotations_of
@@ -30,6 +31,9 @@ _HEAVY_N = 3000.0
 
 _LOWEST = 3
 """Rows of L5S1 in a demand."""
+
+_ALONG, _EXTENSION = 1, 2
+"""Axes of a disc."""
 
 
 @dataclass(frozen=True)
@@ -122,17 +126,23 @@ class TurnedPose:
     Attributes
     ----------
     poses : without translations. unpressed : (7, 3) N m of joints without compression, disc axes.
+    ligaments : (7,) N m of what lies behind the joints, extension positive.
     """
 
     poses: BodyPoses
     unpressed: Array
+    ligaments: Array
 
     @classmethod
     def of(cls, person: Person, task: Task) -> "TurnedPose":
         """Of a person in a task."""
-        rotations = rotations_of(person.chain, angles_of(person, task))
+        if task.instant is None:
+            rotations = rotations_of(person.chain, angles_of(person, task))
+        else:
+            rotations = task.instant.turned @ rotations_of(person.chain, person.upright)
         poses = place_bodies(person.chain, rotations, np.zeros((len(LEVELS), 3)))
-        return cls(poses, person.laws.moments(poses.turned, np.zeros(len(LEVELS))))
+        unpressed = person.laws.moments(poses.turned, np.zeros(len(LEVELS)))
+        return cls(poses, unpressed, person.laws.ligament_moments(poses.turned))
 
 
 def solve_task(
@@ -140,12 +150,14 @@ def solve_task(
     task: Task,
     options: SolverOptions = SolverOptions(),
     tone: float | None = None,
+    nearby: SolvedTask | None = None,
 ) -> SolvedTask:
     """Muscle forces of a task.
 
     Parameters
     ----------
     tone : least activation of every muscle, share of its largest; the task's own by default.
+    nearby : a task much like it, such as the frame before, whose forces shorten the way.
 
     Raises
     ------
@@ -153,10 +165,11 @@ def solve_task(
         For a load that the arms do not reach.
     """
     least = task.tone_share if tone is None and task.tone == "stated" else tone or 0.0
-    first = _iterate(person, task, options, least, np.zeros(len(LEVELS)))
+    still = np.zeros((len(LEVELS), 3))
+    first = _iterate(person, task, options, least, nearby.pushes if nearby else still, nearby)
     if not (options.twice and options.feedback) or first.status is not Balanced.CONVERGED:
         return first
-    again = _iterate(person, task, options, least, np.full(len(LEVELS), _HEAVY_N))
+    again = _iterate(person, task, options, least, np.array([0.0, -_HEAVY_N, 0.0]) + still)
     apart = _change(again.found.forces, first.found.forces)
     if apart > 2.0 * options.change:
         message = f"another start ends {100.0 * apart:.1f} % away"
@@ -175,15 +188,18 @@ def solve_with_forces(person: Person, task: Task, forces: Array, rounds: int = 2
 
 
 def _iterate(
-    person: Person, task: Task, options: SolverOptions, tone: float, start: Array
+    person: Person,
+    task: Task,
+    options: SolverOptions,
+    tone: float,
+    pushes: Array,
+    nearby: SolvedTask | None = None,
 ) -> SolvedTask:
-    """Rounds from a spine pressed by `start` (7,) N."""
+    """Rounds from a spine whose joints carry `pushes` (7, 3) N, disc axes."""
     turned = TurnedPose.of(person, task)
-    pushes = np.zeros((len(LEVELS), 3))
-    pushes[:, 1] = -start
     rounds: list[SolverRound] = []
     trail: list[Array] = []
-    step, last, found = 1.0, np.zeros_like(pushes), None
+    step, last, found = 1.0, np.zeros_like(pushes), nearby.found if nearby else None
     while True:
         now = _solve_round(person, task, options, tone, turned, pushes, nearby=found)
         found = now.found
@@ -268,6 +284,7 @@ def _solve_round(
     loads = applied_loads(person, task, poses)
     stiffening = person.laws.stiffening(-pushes[:, 1])
     joint = stiffening[:, None] * turned.unpressed
+    joint[:, _EXTENSION] += turned.ligaments
     # what loads and joints leave to the muscles, and what these can make
     weights, turning = above(loads.forces, loads.moments, poses.centres)
     required = -(turning + np.einsum("kij,kj->ki", poses.discs, joint))
@@ -295,6 +312,8 @@ def _solve_round(
     # what is above a joint is carried by it: weights, and all fascicles that cross it
     on_joints = weights + np.einsum("mki,m->ki", drawn, found.forces)
     on_discs = np.einsum("kji,kj->ki", poses.discs, on_joints)
+    # ligaments pull the vertebrae together behind the joint
+    on_discs[:, _ALONG] -= turned.ligaments / LIGAMENT_ARM_M
     return SolvedTask(
         *(Balanced.CONVERGED, "", poses, pulls, loads, demand, found),
         *(stretched, on_discs, joint, stiffening),

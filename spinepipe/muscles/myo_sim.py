@@ -21,9 +21,14 @@ Sheath
 What is added
     The thorax is one body, so nothing there joins T11 to T12, and multifidus ends at L1. The trunk
     here bends at T11T12 and T12L1 and needs what bends them: real multifidus goes on upwards level
-    by level. The fascicles of L1 are repeated for T12 and T11, each point as it lies on its
-    vertebra, one and two levels up. Those that run on to the sacrum cannot go up with the others:
-    their cross-section goes to the longest that can, so that every level has as much of it as L1.
+    by level. The fascicles of L1 are repeated for T12 and all vertebrae above it from which they
+    reach down to T12, each point as it lies on its vertebra, so many levels up. Those that run on
+    to the sacrum cannot go up with the others: their cross-section goes to the longest that can,
+    so that every level has as much of it as L1.
+What is moved
+    Muscles of the back lie 5 to 20 mm nearer to the vertebrae than CT finds them in people. They
+    are moved backwards and aside by what the generic male of Allaire 2020, whose muscles were
+    placed by CT (Bruno 2015), has more (decision 0065).
 Not carried
     The cylinders and ellipsoids that muscles wrap there. Fibre lengths, which its fitted lengths
     do not give.
@@ -41,10 +46,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from spinepipe.effects.contract import Array
-from spinepipe.facts import number
+from spinepipe.facts import number, several
 from spinepipe.frames import Pose, rotation_zxy
 from spinepipe.muscles import trunk_source
-from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, THORAX, Trunk
+from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES, THORAX, Trunk
 from spinepipe.muscles.trunk_source import Fascicle, Source
 
 PACKAGE = "myo-sim"
@@ -63,6 +68,9 @@ _FILES = {
 STRESS_PA = number(__name__, "force_over_area")
 """Maximum force over cross-section in the source."""
 
+_FARTHER_MM = several(__name__, "farther_by_ct")
+"""How much farther behind T9 to L5, and aside of them, muscles of the back are by CT."""
+
 GROUPS = {
     "Ps": "psoas",
     "rect_abd": "rectus_abdominis",
@@ -77,6 +85,7 @@ GROUPS = {
 }
 
 _SACRUM, _L1 = 0, BODIES.index("L1")
+_UPWARDS = SLICES[::-1]
 _BODY = {"sacrum": _SACRUM, **{f"lumbar{n}": BODIES.index(f"L{n}") for n in range(1, 6)}}
 _SHEATH = "Abdomen"
 _NAMED_FOR_T12 = re.compile(r"(T12|R12|-12\.\d)_[rl]$")
@@ -151,8 +160,12 @@ def origin_of_myo_sim() -> SourceFiles:
     return SourceFiles(PACKAGE, VERSION, digest.hexdigest())
 
 
-def source_of_myo_sim() -> Source:
+def source_of_myo_sim(placed_by_ct: bool = True) -> Source:
     """The trunk and the remarks on it.
+
+    Parameters
+    ----------
+    placed_by_ct : whether muscles of the back are moved to where CT finds them.
 
     Raises
     ------
@@ -165,8 +178,12 @@ def source_of_myo_sim() -> Source:
     given = list(_fascicles(roots, places_on_trunk))
     fascicles, remarks = trunk_source.mirror_wrong_sides(given)
     ends = places_on_trunk.points(_CHAIN)
-    more, remark = multifidus_above_l1(fascicles, ends[: len(LEVELS)], trunk_source.tilts(ends))
-    trunk = _trunk(places_on_trunk, [*fascicles, *more], roots["head"])
+    more, remark = multifidus_above_l1(fascicles, ends, trunk_source.tilts(ends))
+    fascicles = [*fascicles, *more]
+    if placed_by_ct:
+        fascicles, moved = place_by_ct(fascicles, trunk_source.vertebra_centres(ends))
+        remark = f"{remark}; {moved}"
+    trunk = _trunk(places_on_trunk, fascicles, roots["head"])
     fibres = _on_fibres(roots["muscles"], given)
     return Source(trunk, (*remarks, remark, fibres, trunk_source.DISC_REMARK))
 
@@ -275,24 +292,53 @@ def multifidus_above_l1(
 
     Parameters
     ----------
-    joints : (7, 3) m, centres from L5S1 up. tilts : (7,) rad, extension of the vertebrae L5 to T11.
+    joints : (N, 3) m, centres from L5S1 up. tilts : (N,) rad, extension of the vertebrae from L5.
     """
     mine = [one for one in fascicles if one.group == "multifidus" and max(one.body) == _L1]
     found = []
-    for body in range(_L1 + 1, len(BODIES)):
+    for by in range(1, len(tilts) - _L1 + 1):
         for side in SIDES:
             of_side = [one for one in mine if one.side == side]
-            found += _raise_levels(of_side, body - _L1, joints, tilts)
+            found += _raise_levels(of_side, by, joints, tilts)
     area = 1e6 * sum(one.pcsa for one in found)
     remark = (
         f"the source's multifidus ends at L1 and nothing short spans T11T12: {len(found)} "
-        f"fascicles of L1 are repeated for T12 and T11, {area:.0f} mm2 in all"
+        f"fascicles of L1 are repeated for T12 and above, {area:.0f} mm2 in all"
     )
     return found, remark
 
 
+def place_by_ct(fascicles: Sequence[Fascicle], vertebrae: Array) -> tuple[list[Fascicle], str]:
+    """All with the muscles of the back as far from the vertebrae (17, 3) m, T1 to L5, as CT finds
+    them, and a remark. What lies above T9 or below L5 is moved as what lies there."""
+    vertebrae = vertebrae[SLICES.index("T9") :]
+    back = trunk_source.backwards(vertebrae)
+
+    def moved(one: Fascicle) -> Fascicle:
+        part = one.group.split("_")[0]
+        if f"{part} back" not in _FARTHER_MM:
+            return one
+        by = 1e-3 * np.array(_FARTHER_MM[f"{part} back"])[:, None] * back
+        by[:, 2] = 1e-3 * np.array(_FARTHER_MM[f"{part} aside"])
+        # np.interp asks for rising heights, and vertebrae run downwards
+        heights = (one.point[:, 1], vertebrae[::-1, 1])
+        step = np.stack([np.interp(*heights, by[::-1, axis]) for axis in range(3)], axis=1)
+        if one.side == "left":
+            step = step * [1.0, 1.0, -1.0]
+        return replace(one, point=one.point + step)
+
+    remark = (
+        "erector spinae, multifidus and quadratus lumborum, which lie nearer to the vertebrae than "
+        "CT finds them, are moved by up to 21 mm backwards and 18 mm aside"
+    )
+    return [moved(one) for one in fascicles], remark
+
+
 def _raise_levels(mine: list[Fascicle], by: int, joints: Array, tilts: Array) -> list[Fascicle]:
-    """Fascicles of one side, so many levels up; what ends on the sacrum is added to the longest."""
+    """Fascicles of one side, so many levels up; what ends on the sacrum is added to the longest.
+
+    Those that would not leave the thorax are left out.
+    """
 
     def place(body: int, point: Array) -> Array:
         """A point of a vertebra where it lies on the one so many levels up, joint on joint."""
@@ -303,16 +349,18 @@ def _raise_levels(mine: list[Fascicle], by: int, joints: Array, tilts: Array) ->
 
     short = [one for one in mine if min(one.body) > _SACRUM]
     longest = min(short, key=lambda one: min(one.body))
+    called = _UPWARDS[_L1 + by - 1]
     rest = sum(one.pcsa for one in mine if min(one.body) == _SACRUM)
     return [
         replace(
             one,
-            name=f"{one.name[:-2]}_at_{BODIES[_L1 + by]}{one.name[-2:]}",
+            name=f"{one.name[:-2]}_at_{called}{one.name[-2:]}",
             pcsa=one.pcsa + (rest if one is longest else 0.0),
-            body=tuple(body + by for body in one.body),
+            body=tuple(min(body + by, THORAX) for body in one.body),
             point=np.array([place(*at) for at in zip(one.body, one.point, strict=True)]),
         )
         for one in short
+        if min(one.body) + by < THORAX
     ]
 
 

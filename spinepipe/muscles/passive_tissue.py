@@ -5,21 +5,26 @@ upper vertebra moves on the lower as far as the joint's own compliance lets the 
 paper prints no curves (Ghezelbash 2016 Fig 2); those here are measured ones of others, whole
 segments or discs alone.
 
+What lies behind the joints is slack when one stands and steep at the end of flexion. It is no
+moment alone: it pulls, and presses the disc.
+
 The force of a stretched muscle is an exponential of the strain of its fibres (Thelen 2003; default
 of OpenSim). Fibres are slack up to the length of the upright posture and take up all that the path
 gains; the curve of Davis 2003, which the paper uses, is printed nowhere that we know of.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from spinepipe.anatomy import published
 from spinepipe.effects.contract import Array
-from spinepipe.facts import numbers, several
+from spinepipe.facts import number, numbers, several
+from spinepipe.muscles.trunk import LEVELS
 from spinepipe.units import DEG_PER_RAD
 
 AXIAL_N_PER_M = numbers(__name__, "axial_stiffness")
@@ -28,6 +33,16 @@ PRELOADS_N, PRELOAD_FACTORS = zip(*several(__name__, "stiffening_by_preload").va
 """Stiffness over that without preload, lumbar segments; held beyond the last."""
 
 _STRETCHED = numbers(__name__, "passive_muscle")
+
+LIGAMENT_ARM_M = number(__name__, "ligament_arm")
+LIGAMENTS_BESIDE_L5S1 = numbers(__name__, "ligaments_beside_l5s1")
+"""Their moment in full flexion over that at L5S1."""
+
+LUMBAR_FLEXION_DEG = number(__name__, "lumbar_full_flexion")
+"""Full flexion of L5S1 to T12L1 together, from upright."""
+
+_STEEPNESS = number(__name__, "ligament_steepness")
+_EXTENSION = 2
 
 
 @dataclass(frozen=True)
@@ -70,7 +85,7 @@ class MomentCurve:
         return np.clip(rad, points[0], points[-1]), np.where(rad < points[0], chords[0], chords[-1])
 
 
-def _measured(source: str, back: str = "flexion") -> tuple[MomentCurve, MomentCurve, MomentCurve]:
+def _measured(source: str, back: str = "flexion") -> "Curves":
     """About x, y and z, through the points of two sides, as `heuer flexion` names them in
     `facts.csv`; `back` is extension where a source has one curve for both of its sides."""
     known = several(__name__, "moment_curve")
@@ -98,7 +113,7 @@ def _linear(nm_per_rad: float) -> MomentCurve:
 _GOULD = published("gould_2024b")["uniform_stiffness"]
 _SCHMIDT, _HEUER = _measured("schmidt"), _measured("heuer")
 
-CURVES: Mapping[str, tuple[MomentCurve, MomentCurve, MomentCurve]] = {
+CURVES: Mapping[str, "Curves"] = {
     "segment_gould": (  # linear, whole segments
         _linear(_GOULD["right_bending_nm_per_rad"]),
         _linear(_GOULD["left_rotation_nm_per_rad"]),
@@ -116,6 +131,42 @@ mixed: sideways the disc alone, else whole segments. Ligaments and facets hardly
 sideways; a segment as stiff sideways as Schmidt's needs muscles to bend it where people lean.
 """
 
+Curves = tuple[MomentCurve, MomentCurve, MomentCurve]
+
+T11T12_WITH_RIBS: Curves = _measured("wilke", back="extension")
+"""About x, y and z: the segment with its rib joints."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ligaments:
+    """Ligaments and fascia behind the seven joints, which resist flexion and nothing else.
+
+    Their moment grows exponentially with flexion, from nought upright; beyond full flexion
+    straight on. Compression does not stiffen them.
+
+    Attributes
+    ----------
+    at_full : (7,) N m in full flexion. full : (7,) rad, full flexion of each joint from upright.
+    """
+
+    at_full: Array
+    full: Array
+
+    def moments(self, flexion: Array) -> Array:
+        """(..., 7) N m, extension positive, at flexions (..., 7) rad from upright."""
+        inside = np.clip(flexion, 0.0, self.full)
+        grown = np.expm1(_STEEPNESS * inside / self.full) / np.expm1(_STEEPNESS)
+        beyond = np.maximum(flexion - self.full, 0.0)
+        found: Array = self.at_full * grown + beyond * self.slopes(flexion)
+        return found
+
+    def slopes(self, flexion: Array) -> Array:
+        """(..., 7) N m/rad, how fast that grows."""
+        rate = _STEEPNESS / self.full / np.expm1(_STEEPNESS)
+        inside = np.minimum(flexion, self.full)
+        rising = self.at_full * rate * np.exp(_STEEPNESS * inside / self.full)
+        return np.asarray(np.where(flexion > 0.0, rising, 0.0), dtype=float)
+
 
 @dataclass(frozen=True, eq=False)
 class JointLaws:
@@ -127,13 +178,19 @@ class JointLaws:
     angular : (7, 3) factors of the curves: the person's size, and whatever is varied.
     axial, shear : (7,) and (7, 2) N/m, along the disc's axis; forwards and to the right.
     stiffens : whether compression stiffens the curves.
+    t11t12 : curves of the uppermost joint; None: those of the others.
+    ligaments : behind the joints; None: none.
+    upright : (7,) rad, extension of the joints when standing: ligaments count from there.
     """
 
-    curves: tuple[MomentCurve, MomentCurve, MomentCurve]
+    curves: Curves
     angular: Array
     axial: Array
     shear: Array
     stiffens: bool
+    t11t12: Curves | None = None
+    ligaments: Ligaments | None = None
+    upright: Array = field(default_factory=lambda: np.zeros(len(LEVELS)))
 
     def stiffening(self, compression: Array) -> Array:
         """(..., 7) factor of the moments under compressions (..., 7) N."""
@@ -142,15 +199,35 @@ class JointLaws:
         return np.interp(compression, PRELOADS_N, PRELOAD_FACTORS)
 
     def moments(self, turned: Array, compression: Array) -> Array:
-        """(..., 7, 3) N m on what is above, axes of the disc, for rotation vectors (..., 7, 3)."""
-        curve = np.stack([c.moment(turned[..., k]) for k, c in enumerate(self.curves)], axis=-1)
+        """(..., 7, 3) N m on what is above, axes of the disc, for rotation vectors (..., 7, 3);
+        without those of ligaments."""
+        curve = self._each("moment", turned)
         found: Array = -self.stiffening(compression)[..., None] * self.angular * curve
         return found
 
+    def ligament_moments(self, turned: Array) -> Array:
+        """(..., 7) N m of ligaments on what is above, extension positive."""
+        if self.ligaments is None:
+            return np.zeros(turned.shape[:-1])
+        return self.ligaments.moments(self.upright - turned[..., _EXTENSION])
+
     def slopes(self, turned: Array, compression: Array) -> Array:
         """(7, 3) N m/rad, how fast the resistance grows with the rotations."""
-        slope = np.stack([c.slope(turned[:, k]) for k, c in enumerate(self.curves)], axis=1)
+        slope = self._each("slope", turned)
         found: Array = self.stiffening(compression)[:, None] * self.angular * slope
+        if self.ligaments is not None:
+            found[:, _EXTENSION] += self.ligaments.slopes(self.upright - turned[:, _EXTENSION])
+        return found
+
+    def _each(self, what: Literal["moment", "slope"], turned: Array) -> Array:
+        """(..., 7, 3) of the curves at rotations (..., 7, 3)."""
+
+        def of(curves: Curves, at: Array) -> Array:
+            return np.stack([getattr(c, what)(at[..., k]) for k, c in enumerate(curves)], axis=-1)
+
+        found = of(self.curves, turned)
+        if self.t11t12 is not None:
+            found[..., -1, :] = of(self.t11t12, turned[..., -1, :])
         return found
 
     def translations(self, pushes: Array) -> Array:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.pose import BodyPoses, cross
 from spinepipe.muscles.trunk import BODIES, NO_BODY, SIDES, SLICES, THORAX, Trunk, body_of
+from spinepipe.muscles.trunk_source import backwards
 from spinepipe.muscles.wrapping import wrap_paths
 
 _SACRUM = 0
@@ -188,11 +189,7 @@ def _bars(trunk: Trunk, chosen: NDArray[np.bool_], rule: Standoff) -> Bars:
     # as far behind the centre as the rule says of how far the string is
     string = start[row] + share[:, None] * way[row]
     centres = trunk.vertebrae
-    line = np.concatenate([centres[:1], centres[:-1]]) - np.concatenate([centres[1:], centres[-1:]])
-    # forwards across the spine at each vertebra, in the source's pose: by the centres about it
-    across = np.stack([line[:, 1], -line[:, 0], np.zeros(len(line))], axis=1)
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    centre, back = centres[number], -across[number]
+    centre, back = centres[number], backwards(centres)[number]
     distance = np.einsum("bi,bi->b", string - centre, back)
     at = centre + np.maximum(rule.share * distance, rule.least_m)[:, None] * back
     at[:, 2] += string[:, 2]

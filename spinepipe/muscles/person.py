@@ -15,6 +15,8 @@ from spinepipe.muscles.subject import Subject
 from spinepipe.muscles.trunk import LEVELS, Mass
 from spinepipe.units import STANDARD_GRAVITY
 
+_EXTENSION = 2
+
 
 @dataclass(frozen=True, eq=False)
 class Person:
@@ -51,14 +53,16 @@ class Person:
         return bodies, at, kg[:, None] * STANDARD_GRAVITY
 
     def with_upright(self, upright: Array) -> "Person":
-        """The same person with an upright posture (8, 3) rad, in which muscles are at rest."""
+        """The same person with an upright posture (8, 3) rad, in which muscles are at rest and
+        ligaments slack."""
         still = np.zeros((len(LEVELS), 3))
         poses = place_bodies(self.chain, rotations_of(self.chain, upright), still)
         rest = self.lines.pulls(poses).lengths
         # the source's fibres, and where it has none a share of the path
         own = self.lines.trunk.muscles.fibre
         fibres = np.where(own > 0.0, own, self.passive.fibre_share * rest)
-        return replace(self, upright=upright, rest=rest, fibres=fibres)
+        laws = replace(self.laws, upright=poses.turned[:, _EXTENSION])
+        return replace(self, laws=laws, upright=upright, rest=rest, fibres=fibres)
 
 
 def above(forces: Array, moments: Array, centres: Array) -> tuple[Array, Array]:

@@ -10,6 +10,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import Trunk
 
+BEHIND_MM = 4.0
+"""How far joints lie behind the centres of their discs (Ghezelbash 2016, section 2.1)."""
+
 _SMALL = 1e-9
 """Angles, rad, whose square is below rounding: limits stand for quotients there."""
 

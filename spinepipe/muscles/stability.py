@@ -72,20 +72,26 @@ def least_stable(
     none = solve_with_tone(person, task, options, gain, 0.0)
     if none.stands:
         return none
-    # doubled until it stands, then bisected
-    low, high = 0.0, _FIRST
-    best = solve_with_tone(person, task, options, gain, high)
-    while not best.stands:
-        low, high = high, min(2.0 * high, LARGEST_TONE)
-        if low == LARGEST_TONE or best.solved.status is not Balanced.CONVERGED:
+    # doubled until it stands or cannot be held, then bisected: more tone can be too much to hold
+    low, high, best = 0.0, _FIRST, None
+    while best is None:
+        now = solve_with_tone(person, task, options, gain, high)
+        if now.stands:
+            best = now
+        elif now.solved.status is not Balanced.CONVERGED:
+            break
+        elif high == LARGEST_TONE:
             return None
-        best = solve_with_tone(person, task, options, gain, high)
+        else:
+            low, high = high, min(2.0 * high, LARGEST_TONE)
     for _ in range(_HALVINGS):
         middle = solve_with_tone(person, task, options, gain, 0.5 * (low + high))
         if middle.stands:
             high, best = middle.tone, middle
-        else:
+        elif middle.solved.status is Balanced.CONVERGED:
             low = middle.tone
+        else:
+            high = middle.tone
     return best
 
 

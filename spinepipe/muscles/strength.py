@@ -70,7 +70,11 @@ class HeldTask:
 
 
 def hold_task(
-    person: Person, task: Task, options: SolverOptions, seek_least: bool = False
+    person: Person,
+    task: Task,
+    options: SolverOptions,
+    seek_least: bool = False,
+    nearby: SolvedTask | None = None,
 ) -> HeldTask:
     """A task with the forces that hold it, at the stress asked for or the least above that does.
 
@@ -78,13 +82,14 @@ def hold_task(
     ----------
     seek_least : whether the least stress is sought where less than what was asked for does; else
         it is not told there.
+    nearby : a task much like it, such as the frame before, whose forces shorten the way.
 
     Raises
     ------
     ValueError
         For a load that the arms do not reach.
     """
-    asked = solve_task(person, task, options)
+    asked = solve_task(person, task, options, nearby=nearby)
     now = HeldTask(asked, asked, person, task, None)
     # with L5S1 balanced alone, what other joints ask for is not to be made
     if options.lowest_alone or (_is_held(now, options) and not seek_least):
@@ -102,7 +107,7 @@ def hold_task(
         stress = min(max(stress, _STEP * too_little), max(HIGHEST_PA, task.stress_pa))
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
             break
-        now, solves = _at(person, task, stress, options, asked), solves + 1
+        now, solves = _at(person, task, stress, options, now), solves + 1
     if best is None:
         return replace(_not_held(now, person, task), solves=solves)
     least = min(best.task.stress_pa, best.least_pa or np.inf)
@@ -124,24 +129,22 @@ def above_asked(solved: SolvedTask, asked: Task, held: Task) -> SolvedTask:
 
 
 def _at(
-    person: Person, task: Task, stress_pa: float, options: SolverOptions, asked: SolvedTask
+    person: Person, task: Task, stress_pa: float, options: SolverOptions, before: HeldTask
 ) -> HeldTask:
     """The task at another stress, stretched tissue as it was."""
     # the force of what is stretched is told in shares of strength
     factor = person.passive.factor * task.stress_pa / stress_pa
     who = replace(person, passive=replace(person.passive, factor=factor))
     harder = replace(task, stress_pa=stress_pa)
-    solved = solve_task(who, harder, options)
-    return HeldTask(solved, asked, who, harder, _least_pa(solved, options))
+    solved = solve_task(who, harder, options, nearby=before.solved)
+    return HeldTask(solved, before.asked, who, harder, _least_pa(solved, options))
 
 
 def _not_held(last: HeldTask, person: Person, task: Task) -> HeldTask:
     """A task that all the stress of trunks does not hold: as it was asked for, and why."""
     asked, demand = last.asked, last.solved.demand
-    if (
-        asked.status is not Balanced.BEYOND_STRENGTH
-    ):  # rounds that do not end say nothing of muscles
-        return HeldTask(asked, asked, person, task, None)
+    if last.least_pa is not None and last.least_pa <= HIGHEST_PA:  # rounds that found no end
+        return HeldTask(asked, asked, person, task, last.least_pa)
     if last.least_pa is None:
         freely = least_slack_forces(replace(demand, most=np.full(len(demand.most), np.inf)))
         slack, short_of = demand.required - demand.arms @ freely, "arms"
@@ -154,7 +157,9 @@ def _not_held(last: HeldTask, person: Person, task: Task) -> HeldTask:
             f"takes {_MPA * last.least_pa:.3g} MPa of muscle stress, most of all for {at}, "
             f"and trunks have {_MPA * HIGHEST_PA:g} at most"
         )
-    solved = replace(asked, message=f"{asked.message}; {why}")
+    # where no forces hold, those that leave least over may go to and fro
+    message = f"{asked.message}; {why}"
+    solved = replace(asked, status=Balanced.BEYOND_STRENGTH, message=message)
     return HeldTask(solved, asked, person, task, last.least_pa, short_of, at)
 
 

@@ -164,6 +164,16 @@ def disc_tilts(vertebrae: Array) -> Array:
     return 0.5 * (below + vertebrae)
 
 
+def backwards(vertebrae: Array) -> Array:
+    """(N, 3) of length 1, backwards across the spine at vertebrae (N, 3) m, from above, by the
+    centres about each."""
+    line = np.concatenate([vertebrae[:1], vertebrae[:-1]])
+    line = line - np.concatenate([vertebrae[1:], vertebrae[-1:]])
+    back = np.stack([-line[:, 1], line[:, 0], np.zeros(len(line))], axis=1)
+    found: Array = back / np.linalg.norm(back, axis=1, keepdims=True)
+    return found
+
+
 def vertebra_centres(joints: Array) -> Array:
     """(17, 3) m, T1 to L5, midway between their joints, (18, 3) m, from L5S1 to that above T1."""
     found: Array = 0.5 * (joints[1:] + joints[:-1])[::-1]

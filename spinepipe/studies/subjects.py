@@ -9,6 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.form import read_forms
 from spinepipe.muscles.subject import CM_PER_M, Subject
 from spinepipe.problems import InputProblem
+from spinepipe.units import GRAVITY_M_S2
 
 HEIGHT_CM = (120.0, 220.0)
 MASS_KG = (30.0, 300.0)
@@ -19,9 +20,8 @@ LARGEST_HEIGHT_M = 3.0
 
 M_PER_INCH, M_PER_FOOT = 0.0254, 0.3048
 
-STANDARD_GRAVITY = 9.80665
 
-(SUBJECTS,) = read_forms(Path(__file__).with_name("forms.yaml")).values()
+SUBJECTS = read_forms(Path(__file__).with_name("forms.yaml"))["subjects"]
 
 
 def subject_of(cohort: Cohort, specimen: str) -> Subject:
@@ -61,7 +61,7 @@ def _size(place: tuple[str, int], who: str, cm: float, kg: float) -> Iterator[In
     if not MASS_KG[0] <= kg <= MASS_KG[1]:
         remedy = "correct it"
         if kg > MASS_KG[1]:
-            remedy = f"is it the weight in N? write {kg / STANDARD_GRAVITY:.1f}"
+            remedy = f"is it the weight in N? write {kg / GRAVITY_M_S2:.1f}"
         yield InputProblem(*place, "mass_kg", f"{who} weighs {kg:g} kg", _range(MASS_KG), remedy)
     elif HEIGHT_CM[0] <= cm <= HEIGHT_CM[1]:
         bmi = kg / (cm / 100.0) ** 2

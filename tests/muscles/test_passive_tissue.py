@@ -1,12 +1,16 @@
 """Joints and stretched muscles: measured points, slopes, and what they are stiffened by."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from spinepipe.muscles.passive_tissue import (
     AXIAL_N_PER_M,
     CURVES,
+    T11T12_WITH_RIBS,
     JointLaws,
+    Ligaments,
     MomentCurve,
     PassiveMuscle,
 )
@@ -128,6 +132,57 @@ def test_joints_resist_and_yield() -> None:
     assert moment[:, 2] == pytest.approx(np.full(7, 9.0))
     pushes = np.tile([10.0, -400.0, 20.0], (7, 1))
     assert laws().translations(pushes)[0] == pytest.approx([1e-4, -2e-4, 1e-4])
+
+
+FULL = np.deg2rad(np.array([12.0, 12.9, 10.8, 8.5, 9.0, 7.0, 4.0]))
+BEHIND = Ligaments(np.linspace(100.0, 40.0, 7), FULL)
+
+
+def test_ligaments_are_slack_upright_and_extended_and_reach_their_moment_in_full_flexion() -> None:
+    """And are little before: at half of it (e^2 - 1) / (e^4 - 1), an eighth."""
+    for share, expected in ((-0.5, 0.0), (0.0, 0.0), (0.5, 1.0 / (np.e**2 + 1.0)), (1.0, 1.0)):
+        assert BEHIND.moments(share * FULL) == pytest.approx(expected * BEHIND.at_full)
+
+
+def test_ligaments_go_straight_on_beyond_full_flexion() -> None:
+    steepest = BEHIND.at_full * 4.0 / FULL / (1.0 - np.exp(-4.0))
+    for share in (1.0, 1.1, 3.0):
+        assert BEHIND.slopes(share * FULL) == pytest.approx(steepest)
+        beyond = BEHIND.at_full + (share - 1.0) * FULL * steepest
+        assert BEHIND.moments(share * FULL) == pytest.approx(beyond)
+
+
+@pytest.mark.parametrize("share", [-0.2, 0.3, 0.9, 1.2])
+def test_slopes_of_ligaments(share: float) -> None:
+    there, back = (BEHIND.moments(share * FULL + s) for s in (STEP, -STEP))
+    assert BEHIND.slopes(share * FULL) == pytest.approx((there - back) / (2.0 * STEP), rel=1e-6)
+
+
+def test_ligaments_count_from_upright_and_are_not_stiffened_by_compression() -> None:
+    """They pull backwards where a joint is flexed; extended further than upright they do not."""
+    upright = np.deg2rad(np.linspace(-3.0, 3.0, 7))
+    behind = replace(laws(), ligaments=BEHIND, upright=upright)
+    turned = np.zeros((7, 3))
+    turned[:, 2] = upright - FULL
+    assert behind.ligament_moments(turned) == pytest.approx(BEHIND.at_full)
+    extended = np.zeros((7, 3))
+    extended[:, 2] = upright + 0.1
+    assert behind.ligament_moments(extended) == pytest.approx(np.zeros(7))
+    assert laws().ligament_moments(turned) == pytest.approx(np.zeros(7))
+    pressed = np.full(7, 500.0)
+    steeper = behind.slopes(turned, pressed) - laws().slopes(turned, pressed)
+    assert steeper[:, 2] == pytest.approx(BEHIND.slopes(FULL))
+    assert steeper[:, :2] == pytest.approx(np.zeros((7, 2)))
+
+
+def test_t11t12_has_curves_of_its_own() -> None:
+    """Wilke 2017: 7.5 N m at 3.5 deg of flexion and extension, 4.25 sideways, 3.75 in axial
+    rotation, the middle of the printed ranges; the other joints keep theirs."""
+    own = replace(laws(stiffens=False), t11t12=T11T12_WITH_RIBS)
+    turned = np.tile(np.deg2rad([4.25, 3.75, 3.5]), (7, 1))
+    assert own.moments(turned, np.zeros(7))[-1] == pytest.approx(np.full(3, -7.5))
+    others = laws(stiffens=False).moments(turned, np.zeros(7))
+    np.testing.assert_array_equal(own.moments(turned, np.zeros(7))[:-1], others[:-1])
 
 
 @pytest.mark.parametrize(

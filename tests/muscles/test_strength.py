@@ -81,7 +81,7 @@ def test_flexion_is_added_at_a_level_as_far_as_some_forces_hold_it() -> None:
         extension[level] = held.poses.discs[level][:, 2]
         assert can_be_held(held, made + (1.0 - JUST) * most * extension.ravel())
         assert not can_be_held(held, made + (1.0 + JUST) * most * extension.ravel())
-    assert capacity_left(held_task("flexion_70_with_load")) is None
+    assert capacity_left(held_task("exertion_flexion")) is None
 
 
 # --- the least stress -----------------------------------------------------------------------------

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spinepipe.muscles.myo_sim import multifidus_above_l1
-from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY
+from spinepipe.muscles.myo_sim import multifidus_above_l1, place_by_ct
+from spinepipe.muscles.trunk import BODIES, LEVELS, NO_BODY, THORAX
 from spinepipe.muscles.trunk_source import (
     Fascicle,
     disc_areas,
@@ -59,10 +59,41 @@ def test_multifidus_of_l1_goes_on_upwards_with_all_of_its_cross_section() -> Non
         "longer_at_T11_l": ((T11, 4), 29.0, "left"),
         "short_at_T11_l": ((T11, 5), 31.0, "left"),
     }
-    assert "8 fascicles of L1 are repeated for T12 and T11, 234 mm2 in all" in remark
+    assert "8 fascicles of L1 are repeated for T12 and above, 234 mm2 in all" in remark
     for one in found:
         expected = [[-0.01, 0.03 * (body - 1), one.point[0, 2]] for body in one.body]
         np.testing.assert_allclose(one.point, expected, atol=1e-15)
+
+
+def test_multifidus_goes_on_as_far_as_it_reaches_down_to_t12() -> None:
+    """From T10 the one over two levels, and from T9 that over three, cross T11T12 alone."""
+    joints = np.array([[0.0, 0.03 * level, 0.0] for level in range(12)])
+    found, _ = multifidus_above_l1(LONG, joints, np.zeros(12))
+    above = {
+        one.name: one.body for one in found if one.side == "right" and "_at_T1" not in one.name
+    }
+    above |= {one.name: one.body for one in found if one.name.endswith("_at_T10_r")}
+    assert above == {
+        "longer_at_T10_r": (THORAX, 5),
+        "short_at_T10_r": (THORAX, T12),
+        "longer_at_T9_r": (THORAX, T12),
+    }
+
+
+def test_muscles_of_the_back_are_moved_to_where_ct_finds_them() -> None:
+    """Along a straight spine: multifidus of L3 by 12.5 mm backwards and 5 mm aside, midway to L4
+    by the mean of both, below L5 as there; the left is the mirror of the right, and what is no
+    muscle of the back stays."""
+    vertebrae = np.array([[0.0, 0.03 * level, 0.0] for level in range(16, -1, -1)])
+    point = np.array([[0.01, y, 0.02] for y in (0.06, 0.045, -0.1)])
+    right = replace(fascicle("a_r", 3, 2, 0), point=point)
+    left = replace(right.mirrored(), name="a_l", side="left")
+    other = replace(right, group="psoas")
+    (r, lft, same), _ = place_by_ct([right, left, other], vertebrae)
+    moved = 1e-3 * np.array([[-12.5, 0, 5.0], [-12.35, 0, 5.05], [-11.2, 0, 6.0]])
+    np.testing.assert_allclose(r.point - point, moved, atol=1e-15)
+    np.testing.assert_allclose(lft.point, r.point * [1.0, 1.0, -1.0], atol=1e-15)
+    np.testing.assert_array_equal(same.point, point)
 
 
 def test_repeated_points_lie_on_their_vertebra_as_it_leans() -> None:

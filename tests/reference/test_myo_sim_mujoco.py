@@ -61,7 +61,7 @@ def stripped(element: ET.Element) -> None:
 @pytest.fixture(scope="module")
 def trunk():
     """Without the multifidus that is repeated above L1, which the file has not."""
-    whole = source_of_myo_sim().trunk
+    whole = source_of_myo_sim(placed_by_ct=False).trunk
     own = np.array(["_at_" not in name for name in whole.muscles.names])
     return replace(whole, muscles=whole.muscles.of(own))
 

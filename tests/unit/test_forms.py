@@ -18,8 +18,9 @@ from spinepipe.motion.joint_tables import SIDES
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.muscles import regressions
 from spinepipe.problems import InputProblem
+from spinepipe.studies.recordings import STANCE, TRIALS
 from spinepipe.studies.scoliosis.films import CENTRE, CORNERS, FILMS, NEEDED
-from spinepipe.studies.tracking.trials import FORMS, MOVING, STANCE, TRIALS
+from spinepipe.studies.tracking.trials import FORMS, MOVING
 from spinepipe.studies.trunk_loads.checks import CARRIERS
 from spinepipe.studies.trunk_loads.forms import BODY_FRAMES, FORCE, HANDS, TASKS, UPRIGHT
 from spinepipe.units import COORDINATES

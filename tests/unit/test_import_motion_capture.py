@@ -73,7 +73,7 @@ def laboratory(folder: Path) -> dict[str, object]:
         "persons": [
             {
                 **{"specimen": "p1", "sex": "female", "age_years": 30.0},
-                **{"height_m": 1.7, "mass_kg": 700.0 / 9.80665},
+                **{"height_m": 1.7, "mass_kg": 700.0 / 9.81},
             }
         ],
         "trials": [

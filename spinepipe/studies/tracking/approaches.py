@@ -20,9 +20,9 @@ from spinepipe.motion.skeleton import PELVIS, MarkerTrial
 from spinepipe.motion.skin import with_sliding_skin
 from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
+from spinepipe.studies.recordings import STANCE
 from spinepipe.studies.tracking.persons import TrackedPerson, skeleton_in_trial
 from spinepipe.studies.tracking.settings import CONSTRAINED, Approach, Scales, Tracking
-from spinepipe.studies.tracking.trials import STANCE
 from spinepipe.units import COORDINATES, DEG_PER_RAD, MM_PER_M, ROTATIONS, TRANSLATIONS
 
 _NEAR_ENOUGH = 25

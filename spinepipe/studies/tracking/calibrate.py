@@ -13,12 +13,13 @@ from spinepipe.motion.passive import SHAPE, PassiveElements, PassiveLaw
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.trajectory import solve
 from spinepipe.status import Status
+from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.tracking.approaches import (
     calibration_objective,
     first_guess,
     sample_at_nodes,
 )
-from spinepipe.studies.tracking.persons import motion_digests, person_of
+from spinepipe.studies.tracking.persons import person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import STIFFNESS
 from spinepipe.studies.tracking.trials import trials_of_law

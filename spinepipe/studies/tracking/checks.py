@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from spinepipe.cohort import Cohort
+from spinepipe.documents.form import TableForm
 from spinepipe.documents.inside import outside
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.motion.passive import passive_elements
@@ -18,29 +19,17 @@ from spinepipe.motion.points import marker_places
 from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
 from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.skeleton import BODIES, MarkerSet
+from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource, origin_of_myo_sim
 from spinepipe.problems import InputError, InputProblem, Spelling, one_of
+from spinepipe.studies.checks_of_markers import LoadedTrial
+from spinepipe.studies.checks_of_motion import motion_problems
+from spinepipe.studies.checks_of_recorded import recorded_problems
 from spinepipe.studies.places import unknown_names
+from spinepipe.studies.recordings import STANCE, TRIALS, read_recording, static_trial, trial_rows
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
-from spinepipe.studies.tracking.checks_of_markers import LoadedTrial
-from spinepipe.studies.tracking.checks_of_motion import motion_problems
-from spinepipe.studies.tracking.persons import (
-    marker_set,
-    ratios_of,
-    read_recording,
-    skeleton_in,
-    static_trial,
-    trial_of,
-    trial_rows,
-)
+from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in, trial_of
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
-from spinepipe.studies.tracking.trials import (
-    MARKER_SET,
-    PASSIVE,
-    RATIOS,
-    STANCE,
-    TRIALS,
-    source_kinds,
-)
+from spinepipe.studies.tracking.trials import MARKER_SET, PASSIVE, RATIOS, source_kinds
 from spinepipe.units import COORDINATES
 
 NEEDED = (SUBJECTS, TRIALS, MARKER_SET)
@@ -61,6 +50,10 @@ def check_tracking(
     document: YamlDocument, study: Tracking, cohort: Cohort
 ) -> Iterator[InputProblem]:
     """Everything that is wrong with the tables of a cohort."""
+    if study.marker_set != "own":
+        yield from _lifts(document, study, cohort)
+        yield from _persons_and_trials(cohort)
+        return
     yield from _tables(document, cohort)
     # rows of passive.csv and ratios.csv name joints from L5S1 to T1T2, so they are judged where the
     # chain has all of these; `_tables` tells of one that has not
@@ -89,12 +82,17 @@ def _persons_and_trials(cohort: Cohort) -> Iterator[InputProblem]:
 
 
 def check_recordings(
-    document: YamlDocument, _study: Tracking, cohort: Cohort, _root: Path
+    document: YamlDocument, study: Tracking, cohort: Cohort, _root: Path
 ) -> Iterator[InputProblem]:
     """Everything that is wrong with files of motion; nothing where a table has a fault.
 
-    All kinds of study are handed the same arguments; ``_study`` and ``_root`` are not needed here.
+    All kinds of study are handed the same arguments; ``_root`` is not needed here.
     """
+    if study.marker_set != "own":
+        if not any((*_lifts(document, study, cohort), *_persons_and_trials(cohort))):
+            yield from recorded_problems(cohort, study.cutoff_hz)
+            yield from _source(document)
+        return
     if not any((*_tables(document, cohort), *_persons_and_trials(cohort))) and not any(
         _bodies(cohort)
     ):
@@ -106,8 +104,7 @@ def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
     place = document.place_of("cohort")
     for form in NEEDED:
         if form.stem not in cohort.further:
-            found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
-            yield InputProblem(*place, found, allowed, f"add {form.file}, or name another cohort")
+            yield _without(document, form)
     if not cohort.has_frames:
         found, allowed = "a cohort without joints", "a cohort with joints.csv or landmarks.csv"
         yield InputProblem(*place, found, allowed, "tell where the joints are")
@@ -118,6 +115,36 @@ def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
         yield InputProblem(
             file, None, "vertebrae", found, allowed, "list them all, and their joints"
         )
+
+
+def _lifts(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:
+    """What a study of markers of Plug-in-Gait needs: persons, trials, and ratios that there are."""
+    for form in (SUBJECTS, TRIALS):
+        if form.stem not in cohort.further:
+            yield _without(document, form)
+    try:
+        sets = ratios_of(cohort)
+    except InputError as error:
+        yield from error.problems
+        return
+    if study.ratios not in sets:
+        found, remedy = f"'{study.ratios}'", f"name one, or add it to {cohort.name}/{RATIOS.file}"
+        yield InputProblem(*document.place_of("ratios"), found, one_of(sets), remedy)
+
+
+def _source(document: YamlDocument) -> Iterator[InputProblem]:
+    """The package that spines are made of, where it is not there or is another one."""
+    try:
+        origin_of_myo_sim()
+    except NoSource as error:
+        allowed = f"{PACKAGE} in version {VERSION}"
+        yield InputProblem(*document.place_of("marker_set"), error.found, allowed, REMEDY)
+
+
+def _without(document: YamlDocument, form: TableForm) -> InputProblem:
+    found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
+    remedy = f"add {form.file}, or name another cohort"
+    return InputProblem(*document.place_of("cohort"), found, allowed, remedy)
 
 
 def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:

@@ -11,13 +11,14 @@ from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.scaling import SEGMENTS, body_factors, steps_of
 from spinepipe.motion.skeleton import Skeleton
+from spinepipe.studies.recordings import STANCE
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.error_metrics import Truth, errors_of, truths
 from spinepipe.studies.tracking.persons import centres_of, skeleton_in
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import ERRORS
 from spinepipe.studies.tracking.tracked_motions import motions
-from spinepipe.studies.tracking.trials import STANCE, kinds_of_trials
+from spinepipe.studies.tracking.trials import kinds_of_trials
 from spinepipe.tables import from_rows, read_frames, write
 
 

@@ -14,15 +14,13 @@ from spinepipe.motion.marker_groups import rigidity, runs
 from spinepipe.motion.scaling import SEGMENTS
 from spinepipe.motion.skeleton import BODIES, MarkerSet, MarkerTrial
 from spinepipe.problems import InputProblem
+from spinepipe.studies.recordings import motion_digests, read_recording, trial_rows
 from spinepipe.studies.tracking.persons import (
     ScaledPerson,
     TrackedPerson,
     marker_set,
-    motion_digests,
     person_of,
-    read_recording,
     size_of,
-    trial_rows,
 )
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import CLUSTERS, REMARKS, SIZES

@@ -9,14 +9,43 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.checks import check_recordings, check_tracking
-from spinepipe.studies.tracking.persons import motion_digests
 from spinepipe.studies.tracking.profile import PROFILED, REGIONS
 from spinepipe.studies.tracking.settings import Tracking
-from spinepipe.studies.tracking.trials import FORMS, approaches_on_trials, calibration_of
+from spinepipe.studies.tracking.trials import (
+    FORMS,
+    approaches_on_trials,
+    calibration_of,
+    digests_of_lifts,
+)
+
+
+def _digests_of_lifts(expected: Any, _place: Mapping[str, str]) -> list[str]:
+    """Of the recorded motion of all persons, and of the trunk that they are given."""
+    return digests_of_lifts(expected.cohort)
+
+
+OF_LIFTS = ("joint_moments", "moment_agreement")
+"""Tables of a study of markers of Plug-in-Gait; it has no others."""
+
+_LIFTS = Job(
+    "joint_moments",
+    "",
+    (),
+    OF_LIFTS,
+    ignores=ignoring(
+        *(
+            name
+            for name in Tracking.model_fields
+            if name not in {*Study.model_fields, "kind", "marker_set", "cutoff_hz", "ratios"}
+        )
+    ),
+    also=_digests_of_lifts,
+)
 
 _ANALYSES = (
     Job("ranges", "", ("tracked",), ("ranges",)),
@@ -56,6 +85,12 @@ class TrackingFiles(StudyFiles):
     full = FULL
     joined = (*_OF_MOTIONS, "stiffness", *_OF_PROFILES, *_OF_RECORDINGS, "weights")
     drawings = (
+        Figure(
+            "moments",
+            "Net moment over time, computed and measured",
+            "charts_of_moments:moments",
+            ("joint_moments", "moment_agreement"),
+        ),
         Figure("approach_errors", "Errors of approaches", "charts:approach_errors", ("errors",)),
         Figure("error_by_level", "Errors by level", "charts:error_by_level", ("errors",)),
         Figure(
@@ -96,7 +131,9 @@ class TrackingFiles(StudyFiles):
         taken: dict[tuple[str, str, str], str | None] = {
             (name, trial, approach): calibration_of(cohort, name, trial, approach)
             for name in names
-            for trial, approach in approaches_on_trials(study, cohort, name)
+            for trial, approach in (
+                approaches_on_trials(study, cohort, name) if study.marker_set == "own" else ()
+            )
         }
         return cls(study, names, taken)
 
@@ -108,6 +145,8 @@ class TrackingFiles(StudyFiles):
     @property
     def tables(self) -> tuple[str, ...]:
         """The tables that this study has."""
+        if self.study.marker_set != "own":
+            return OF_LIFTS
         laws = ("stiffness",) if self.laws else ()
         made = (name for job in _ANALYSES for name in job.writes)
         analysed = (name for name in made if beside() or not name.startswith("against"))
@@ -147,6 +186,8 @@ class TrackingFiles(StudyFiles):
     @property
     def others(self) -> tuple[str, ...]:
         """Skeletons and motions as OpenSim reads them."""
+        if self.study.marker_set != "own":
+            return ()
         skeletons = (f"opensim/{name}.osim" for name in self.specimens)
         return (*skeletons, *(f"opensim/{'/'.join(key)}.mot" for key in self.taken))
 
@@ -236,6 +277,7 @@ KIND = Kind(
             also=_digests_of_export,
         ),
         *_ANALYSES,
+        _LIFTS,
     ),
     exports="opensim:exported",
     forms=(SUBJECTS, *FORMS),

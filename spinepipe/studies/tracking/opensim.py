@@ -15,7 +15,8 @@ from spinepipe.motion.export import mot, opensim_names, osim
 from spinepipe.motion.skeleton import BODIES
 from spinepipe.studies.exports import Exported, refuse
 from spinepipe.studies.kind import WantedFiles
-from spinepipe.studies.tracking.persons import TrackedPerson, motion_digests, person_of
+from spinepipe.studies.recordings import motion_digests
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tracked_motions import motions
 from spinepipe.tables import read_frame

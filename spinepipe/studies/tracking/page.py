@@ -7,11 +7,13 @@ from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.studies.tracking import tables as shapes
 from spinepipe.studies.tracking.conclusions import conclusions, window_rows
+from spinepipe.studies.tracking.conclusions_of_moments import conclusions_of_moments
 from spinepipe.studies.tracking.scenes import tracking_scenes
 from spinepipe.studies.tracking.settings import Tracking
 
 READ = (
     *("accuracy", "against_wang_2021", "clusters", "drawn", "errors", "fits", "profile_points"),
+    *("joint_moments", "moment_agreement"),
     *("profiles", "ranges", "remarks", "sharing", "similarity", "sizes", "stiffness", "weights"),
 )
 """Tables whose rows the page needs; of the others it tells where they come from."""
@@ -37,6 +39,16 @@ _IN_THE_FILE = {
 
 def page(study: Tracking, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
+    if study.marker_set != "own":
+        beside = results.table("moment_agreement")
+        title = "How moments agree with measured ones"
+        return Page(
+            conclusions=list(conclusions_of_moments(study, results.tables)),
+            sentences=sentences_of(__package__),
+            key_figure="moments",
+            tables=page_tables(shapes.MOMENT_AGREEMENT, title, beside) if len(beside) else [],
+            left_out=() if len(beside) else ("agreement (no moment was measured)",),
+        )
     parts = []
     if results.table("errors").empty:
         parts.append("errors (where vertebrae truly were is not known)")

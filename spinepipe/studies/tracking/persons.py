@@ -8,12 +8,9 @@ trunk), where it tells no inertia, that of an elliptic cylinder of the mass. A c
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from hashlib import sha256
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from spinepipe.anatomy.segments import MASS_PERCENT
 from spinepipe.cohort import Cohort
@@ -23,7 +20,6 @@ from spinepipe.frames import Pose
 from spinepipe.motion.body_segments import ARMS, slice_inertias, with_head_and_arms
 from spinepipe.motion.joint_tables import bounds, ratio_sets
 from spinepipe.motion.passive import PassiveElements, passive_elements
-from spinepipe.motion.reading import DEFAULT_AXES, NoFrameError, read_motion
 from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.scaling import ScalingFit, body_factors, fit_scaling, scale_skeleton
 from spinepipe.motion.skeleton import (
@@ -37,19 +33,11 @@ from spinepipe.motion.skeleton import (
 )
 from spinepipe.muscles.masses import ahead_cm, slice_percents
 from spinepipe.muscles.subject import REFERENCE, Subject
-from spinepipe.problems import InputError, InputProblem
+from spinepipe.studies.recordings import Row, of_specimen, read_recording, static_trial, trial_rows
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.settings import Scaling
 from spinepipe.studies.tracking.tables import NO_STATIC, NOT_TOLD, TOLD
-from spinepipe.studies.tracking.trials import (
-    BOUNDS,
-    CENTRES,
-    MARKER_SET,
-    PASSIVE,
-    RATIOS,
-    STANCE,
-    TRIALS,
-)
+from spinepipe.studies.tracking.trials import BOUNDS, CENTRES, MARKER_SET, PASSIVE, RATIOS
 from spinepipe.units import MM_PER_M
 
 PELVIS_BELOW_M = 0.05
@@ -61,9 +49,6 @@ _COM = [f"com_{name}" for name in _POINT]
 _INERTIA = [f"i{axes}_kg_m2" for axes in ("xx", "yy", "zz", "xy", "xz", "yz")]
 
 AS_IT_IS = "the cohort's skeleton is taken as it is"
-
-Row = Mapping[Any, Any]
-"""Cells of a row by their columns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,59 +155,6 @@ def skeleton_in_trial(person: TrackedPerson, trial: MarkerTrial) -> Skeleton:
 def ratios_of(cohort: Cohort) -> Mapping[str, Array]:
     """Sets of ratios that come along, and the cohort's own."""
     return ratio_sets(cohort.further.get(RATIOS.stem), f"{cohort.name}/{RATIOS.file}")
-
-
-def of_specimen(table: pd.DataFrame, specimen: str) -> pd.DataFrame:
-    """The rows of a specimen."""
-    return table[table["specimen"] == specimen]
-
-
-def trial_rows(cohort: Cohort, specimen: str) -> tuple[Row, ...]:
-    """Rows of `trials.csv`, with the line of each as `line`."""
-    rows = of_specimen(cohort.further[TRIALS.stem], specimen)
-    return tuple(rows.assign(line=rows.index).to_dict("records"))
-
-
-def motion_files(cohort: Cohort, specimen: str) -> tuple[Path, ...]:
-    """Files of motion of a person, each once: what a job of the person reads besides tables."""
-    names = of_specimen(cohort.further[TRIALS.stem], specimen)["file"]
-    return tuple(cohort.folder / name for name in dict.fromkeys(names))
-
-
-def motion_digests(cohort: Cohort, specimen: str) -> list[str]:
-    """Digests of the files of motion of a person, on which results hang besides tables."""
-    return [sha256(path.read_bytes()).hexdigest() for path in motion_files(cohort, specimen)]
-
-
-def static_trial(cohort: Cohort, specimen: str) -> str | None:
-    """Name of the trial that tells the size: the one marked static, else the first stance."""
-    rows = of_specimen(cohort.further[TRIALS.stem], specimen)
-    for chosen in (rows["static"] == "yes", rows["kind"] == STANCE):
-        if chosen.any():
-            return str(rows["trial"][chosen].iloc[0])
-    return None
-
-
-def read_recording(row: Row, cohort: str, folder: Path) -> MarkerRecording:
-    """The motion that a row of `trials.csv` names, all markers of the file.
-
-    Raises
-    ------
-    InputError
-        Of a file that cannot be read, or a row that leaves no frame of it.
-    ValueError
-        Of axes that are none.
-    """
-    name, axes = str(row["file"]), row["axes"]
-    start, end = (float(str(row[key])) for key in ("start_s", "end_s"))
-    text = axes if isinstance(axes, str) else DEFAULT_AXES
-    try:
-        return read_motion(folder / name, text, start, end, f"{cohort}/{name}")
-    except NoFrameError as error:
-        (problem,) = error.problems
-        found = f"{problem.found} in {name}"
-        at = (f"{cohort}/{TRIALS.file}", row["line"], "start_s" if error.late else "end_s")
-        raise InputError([InputProblem(*at, found, problem.allowed, problem.remedy)]) from error
 
 
 def trial_of(row: Row, markers: MarkerSet, recorded: MarkerRecording) -> MarkerTrial:

@@ -11,8 +11,8 @@ from spinepipe.plausibility.score import suspect, usual
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning, TableCell, warn
 from spinepipe.problems import InputError
 from spinepipe.studies.plausibility import subject_doubts
-from spinepipe.studies.tracking.persons import read_recording, trial_rows
-from spinepipe.studies.tracking.trials import MARKER_SET, STANCE, TRIALS
+from spinepipe.studies.recordings import STANCE, TRIALS, read_recording, trial_rows
+from spinepipe.studies.tracking.trials import MARKER_SET
 
 MOST_BYTES = 5_000_000
 """Larger files of motion are read when the study starts, not by `check`."""

@@ -17,12 +17,13 @@ from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.objective import MotionObjective, SampledTrial
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.trajectory import solve
+from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.tracking.approaches import (
     calibration_objective,
     first_guess,
     sample_at_nodes,
 )
-from spinepipe.studies.tracking.persons import motion_digests, person_of
+from spinepipe.studies.tracking.persons import person_of
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.tracking.tables import LIMIT, PROFILE_POINTS, PROFILES
 from spinepipe.studies.tracking.trials import BOTH

@@ -16,9 +16,10 @@ from scipy import stats
 from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Value
 from spinepipe.statistics.outcome import SAME, Array, corrected, family_size, mean_of
+from spinepipe.studies.recordings import STANCE
 from spinepipe.studies.tracking.settings import LEARNT, OWN
 from spinepipe.studies.tracking.tables import MEASURES
-from spinepipe.studies.tracking.trials import STANCE, kinds_of_trials
+from spinepipe.studies.tracking.trials import kinds_of_trials
 from spinepipe.studies.tracking.words import sort_approaches
 
 FEWEST = 3

@@ -188,6 +188,24 @@ class Tracking(Study):
     """
 
     kind: Literal["tracking"]
+    marker_set: Literal["own", "plug_in_gait"] = Field(
+        default="own",
+        description="own: marker_set.csv of the cohort, by the approaches below; plug_in_gait: "
+        "pelvis, thorax, head and arms as Plug-in-Gait marks them, and net moments of all joints "
+        "of a spine made of sex, height and mass; of what follows `cutoff_hz` and `ratios` count",
+    )
+    cutoff_hz: float = Field(
+        default=6.0,
+        gt=0,
+        le=50,
+        description="of the zero-phase low-pass filter that Plug-in-Gait markers go through",
+    )
+    ratios: str = Field(
+        default="christophy_2012",
+        pattern="^[a-z0-9_]+$",
+        description="set of ratios that shares what turns between pelvis and thorax among joints, "
+        "with Plug-in-Gait",
+    )
     approaches: EachOnce[Approach] = Field(default=APPROACHES, description="what is compared")
     intervals: int = Field(default=100, ge=10, le=2000, description="between nodes of a motion")
     force_cost: ForceCost = Field(

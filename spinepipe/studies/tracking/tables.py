@@ -17,6 +17,8 @@ SIMILARITY = declared(__file__, "similarity")
 ERRORS = declared(__file__, "errors")
 ACCURACY = declared(__file__, "accuracy")
 WEIGHTS = declared(__file__, "weights")
+JOINT_MOMENTS = declared(__file__, "joint_moments")
+MOMENT_AGREEMENT = declared(__file__, "moment_agreement")
 AGAINST_WANG_2021 = declared(__file__, "against_wang_2021")
 
 PELVIS = "pelvis"

@@ -15,6 +15,7 @@ from spinepipe.motion.objective import SampledTrial
 from spinepipe.motion.passive import PassiveElements, PassiveLaw
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.skeleton import BODIES, JOINTS, body_poses
+from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.tracking.approaches import (
     ApproachMotion,
     find_motion,
@@ -22,12 +23,7 @@ from spinepipe.studies.tracking.approaches import (
     sample_at_nodes,
 )
 from spinepipe.studies.tracking.fit_rows import Row, failed_row, fit_row
-from spinepipe.studies.tracking.persons import (
-    TrackedPerson,
-    motion_digests,
-    person_of,
-    ratios_of,
-)
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of, ratios_of
 from spinepipe.studies.tracking.settings import LEARNT, OWN, Approach, Tracking
 from spinepipe.studies.tracking.tables import DRAWN, FITS, TRACKED
 from spinepipe.studies.tracking.tracked_motions import IN_ORDER

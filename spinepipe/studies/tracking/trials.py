@@ -1,23 +1,22 @@
 """Trials of a cohort: their files and kinds, and which approaches a study tries on which.
 
-The forms of all files that a study of tracked motions reads are in `forms.yaml`.
+The forms of files that no other kind reads are in `forms.yaml`.
 """
 
 from pathlib import Path
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import read_forms
+from spinepipe.muscles.myo_sim import origin_of_myo_sim
+from spinepipe.studies.recordings import MOVING, RECORDED, STANCE, TRIALS, motion_digests
 from spinepipe.studies.tracking.settings import LEARNT, OWN, Approach, Tracking
-
-STANCE = "stance"
-MOVING = ("flexion_extension", "lateral_bending", "axial_rotation")
-"""Kinds of trials that move, in the order of the rotation that they are about."""
 
 AXIS = {kind: axis for axis, kind in enumerate(MOVING)}
 """Rotation that a kind of motion is about, among extension, right bending and left rotation."""
 
-FORMS = tuple(read_forms(Path(__file__).with_name("forms.yaml")).values())
-TRIALS, MARKER_SET, PASSIVE, RATIOS, BOUNDS, CENTRES, TRUTH_CENTRES = FORMS
+OWN_FORMS = tuple(read_forms(Path(__file__).with_name("forms.yaml")).values())
+MARKER_SET, PASSIVE, RATIOS, BOUNDS, CENTRES, TRUTH_CENTRES = OWN_FORMS
+FORMS = (*RECORDED, *OWN_FORMS)
 
 SMOOTH: Approach = "ik_smooth"
 """The approach that differs from inverse kinematics by time alone."""
@@ -27,6 +26,12 @@ BOTH = ("flexion_extension", "lateral_bending")
 
 _CALIBRATED_ON: dict[str, str] = {kind: name for name, kind in LEARNT.items() if kind != "both"}
 """Name of the calibration on trials of a kind alone, where it has one of its own."""
+
+
+def digests_of_lifts(cohort: Cohort) -> list[str]:
+    """What net moments hang on besides tables: files of motion, and the trunk given to persons."""
+    found = [one for name in cohort.specimen_names for one in motion_digests(cohort, name)]
+    return [*found, origin_of_myo_sim().sha256]
 
 
 def kinds_of_trials(cohort: Cohort) -> dict[tuple[str, str], str]:

@@ -9,6 +9,7 @@ import numpy as np
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion.skeleton import MarkerTrial
+from spinepipe.studies.recordings import motion_digests
 from spinepipe.studies.tracking.approaches import (
     ApproachMotion,
     find_motion,
@@ -17,7 +18,7 @@ from spinepipe.studies.tracking.approaches import (
 )
 from spinepipe.studies.tracking.error_metrics import Truth, errors_of, truths
 from spinepipe.studies.tracking.fit_rows import Row, failed_row, fit_row
-from spinepipe.studies.tracking.persons import TrackedPerson, motion_digests, person_of
+from spinepipe.studies.tracking.persons import TrackedPerson, person_of
 from spinepipe.studies.tracking.settings import Approach, Tracking
 from spinepipe.studies.tracking.tables import WEIGHTS
 from spinepipe.studies.tracking.tracked_motions import TrackedMotion

@@ -14,7 +14,7 @@ from spinepipe.problems import InputProblem, one_of
 from spinepipe.studies.trunk_loads.forms import FORCE, HANDS, PUSH_N, PUSH_NM, TASKS, turn
 from spinepipe.studies.trunk_loads.postures import THORAX_DEG, Row, rhythm, turned_deg
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
-from spinepipe.units import MM_PER_M, ROTATIONS
+from spinepipe.units import GRAVITY_M_S2, MM_PER_M, ROTATIONS
 
 PUSHED = "applied_at"
 
@@ -77,7 +77,7 @@ def task_problems(
         postures = list(_posture(row, means))
         yield from postures
         if (kg := row.number("hand_load_kg")) > HEAVIEST_KG:
-            remedy = f"is it in N? write {kg / 9.80665:.1f}"
+            remedy = f"is it in N? write {kg / GRAVITY_M_S2:.1f}"
             yield row.problem("hand_load_kg", f"{kg:g} kg", f"{HEAVIEST_KG:g} at most", remedy)
         yield from _place_of_hands(row, means, None if postures else tallest_m)
         yield from _push(row)

@@ -15,7 +15,16 @@ from spinepipe.muscles.folder import SpecimenTables, source_of_folder
 from spinepipe.muscles.masses import masses_of
 from spinepipe.muscles.muscle_equilibrium import SolverOptions
 from spinepipe.muscles.myo_sim import origin_of_myo_sim, source_of_myo_sim
-from spinepipe.muscles.passive_tissue import AXIAL_N_PER_M, CURVES, JointLaws, PassiveMuscle
+from spinepipe.muscles.passive_tissue import (
+    AXIAL_N_PER_M,
+    CURVES,
+    LIGAMENTS_BESIDE_L5S1,
+    LUMBAR_FLEXION_DEG,
+    T11T12_WITH_RIBS,
+    JointLaws,
+    Ligaments,
+    PassiveMuscle,
+)
 from spinepipe.muscles.paths import Lines, Standoff
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import JointCentres
@@ -34,7 +43,7 @@ from spinepipe.muscles.trunk import BODIES, LEVELS, Trunk
 from spinepipe.muscles.trunk_source import Source
 from spinepipe.muscles.upright import Upright, upright
 from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.trunk_loads.postures import between
+from spinepipe.studies.trunk_loads.postures import between, shares
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -172,12 +181,20 @@ def _sized(
 
 
 def laws_of(settings: TrunkLoads, source: Trunk, size: BeamRatios, values: Values) -> JointLaws:
-    """Joints of a person of a size; T11T12 from T12L1 by its disc, stiffer in bending."""
+    """Joints of a person of a size; T11T12 with its ribs, or from T12L1 by its disc."""
     passive = settings.passive
     upper = t11t12_over_t12l1(source, passive.t11t12_bending_factor)
+    with_ribs = passive.t11t12 == "segment_wilke"
     angular = np.full((len(LEVELS), 3), size.angular * passive.rotation_factor)
-    angular[-1] *= [upper.angular, upper.torsion, upper.angular]
+    if not with_ribs:
+        angular[-1] *= [upper.angular, upper.torsion, upper.angular]
     angular *= values.get("passive_rotation", 1.0)
+    # joints share full flexion as they share any
+    shared = shares("extension")
+    full = LUMBAR_FLEXION_DEG / DEG_PER_RAD * shared / shared[:-1].sum()
+    beside = np.array([LIGAMENTS_BESIDE_L5S1[level] for level in LEVELS])
+    beside[-1] *= not with_ribs  # a whole segment has its own
+    ligaments = Ligaments(passive.ligaments_nm * angular[0, 2] * beside, full)
     shear = published("gould_2024b")["uniform_stiffness"]
     across = np.array([[shear["anterior_n_per_m"], shear["right_n_per_m"]]], dtype=float)
     axial: Array = size.axial * np.array([AXIAL_N_PER_M[level] for level in LEVELS])
@@ -188,6 +205,8 @@ def laws_of(settings: TrunkLoads, source: Trunk, size: BeamRatios, values: Value
         axial,
         size.axial * np.repeat(across, len(LEVELS), axis=0),
         passive.stiffens_under_compression,
+        T11T12_WITH_RIBS if with_ribs else None,
+        ligaments,
     )
 
 

@@ -70,8 +70,23 @@ class Passive(BaseModel):
     rotation_factor: float = Field(
         default=1.0, gt=0, le=10, description="factor of all moments of joints"
     )
+    t11t12: Literal["segment_wilke", "as_t12l1"] = Field(
+        default="segment_wilke",
+        description="T11T12: whole segment with its rib joints (Wilke 2017), or as T12L1 by its "
+        "disc",
+    )
     t11t12_bending_factor: float = Field(
-        default=1.2, gt=0, le=10, description="of T11T12, for the rib cage (Ghezelbash 2016 2.1)"
+        default=1.2,
+        gt=0,
+        le=10,
+        description="of T11T12 as T12L1, for the rib cage (Ghezelbash 2016 2.1)",
+    )
+    ligaments_nm: float = Field(
+        default=95.0,
+        ge=0,
+        le=300,
+        description="moment of ligaments and fascia behind L5S1 in full flexion, of a man, beside "
+        "disc and stretched muscles (Dolan 1994); 0: none",
     )
     joints_behind_mm: float = Field(
         default=4.0,
@@ -194,6 +209,34 @@ class Uncertain(BaseModel):
         return self.samples * (len(self.factors) + 2)
 
 
+class Motions(BaseModel):
+    """Recorded lifts, frame by frame."""
+
+    model_config = FORM
+
+    trials: EachOnce[str] = Field(
+        default=(), description="recorded trials whose frames are tasks, of everyone who has them"
+    )
+    every: int = Field(default=1, ge=1, le=1000, description="take every so manieth frame")
+    largest_stress_mpa: float = Field(
+        default=0.6,
+        gt=0,
+        le=3,
+        description="largest active stress of muscles; what it does not hold is held at the least "
+        "that does, as far as trunks have it",
+    )
+    samples: int = Field(
+        default=0,
+        ge=0,
+        le=10_000,
+        description="persons drawn for bands, by the factors of uncertain; 0: no bands. Hands are "
+        "where they were seen: their factor does not count",
+    )
+    samples_every: int = Field(
+        default=10, ge=1, le=1000, description="bands are of every so manieth frame that is taken"
+    )
+
+
 class VolunteerSettings(BaseModel):
     """The person whose pressures were measured, and what may be fitted to them."""
 
@@ -246,6 +289,7 @@ class TrunkLoads(Study):
         default=(), description="tasks whose muscles are drawn in 3-D; none named: the first"
     )
     uncertain: Uncertain = Field(default=Uncertain(), description="samples of persons and models")
+    motions: Motions = Field(default=Motions(), description="recorded lifts, frame by frame")
     volunteer: VolunteerSettings | None = Field(
         default=None, description="the person whose pressures were measured"
     )

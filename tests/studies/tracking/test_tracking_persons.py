@@ -24,14 +24,13 @@ from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.points import marker_places as model_places
 from spinepipe.motion.skeleton import JOINTS, body_poses
 from spinepipe.muscles.subject import Subject
+from spinepipe.studies.recordings import motion_files, static_trial
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.tracking.persons import (
     TrackedPerson,
-    motion_files,
     person_of,
     ratios_of,
     skeleton_in_trial,
-    static_trial,
 )
 from spinepipe.studies.tracking.trials import FORMS
 

@@ -317,7 +317,9 @@ def test_numbers_decide_what_is_concluded(case: Case) -> None:
 def test_every_sentence_is_said_by_some_study() -> None:
     assert not list(faults_of_sentences(PACKAGE))
     said = set().union(*(verdicts(concluded(case)) for case in CASES))
-    assert all_verdicts(sentences_of(PACKAGE)) == said
+    # those of recorded lifts: test_lift_page.py
+    of_tasks = {one for one in all_verdicts(sentences_of(PACKAGE)) if not one[0].startswith("lift")}
+    assert of_tasks == said
 
 
 # --- single claims --------------------------------------------------------------------------------

@@ -10,8 +10,8 @@ from spinepipe.frames import zxy_angles
 from spinepipe.motion.marker_groups import rigid_rotations
 from spinepipe.motion.reading import axes_of
 from spinepipe.problems import InputProblem
-from spinepipe.studies.tracking.checks_of_markers import LoadedTrial, marker_problems
-from spinepipe.studies.tracking.trials import MOVING, STANCE
+from spinepipe.studies.checks_of_markers import LoadedTrial, marker_problems
+from spinepipe.studies.recordings import MOVING, STANCE
 from spinepipe.units import DEG_PER_RAD
 
 LIKE_THE_SET = (0.4, 2.5)
@@ -44,10 +44,10 @@ def motion_problems(look: LoadedTrial) -> Iterator[InputProblem]:
         remedy = "check names and units of file and set"
         if LIKE_THE_SET[0] < size / nearest < LIKE_THE_SET[1]:
             held, told = MISTAKEN[nearest]
-            remedy = f"is it in {held} and says {told}? or is marker_set.csv not in mm?"
+            remedy = f"is it in {held} and says {told}? or is {look.set} not in mm?"
         times = f"{size:.{0 if size >= 1 else 4}f} times"
         allowed = f"{LIKE_THE_SET[0]:g} to {LIKE_THE_SET[1]:g} times"
-        wrong = f"markers spread {times} as far as in marker_set.csv"
+        wrong = f"markers spread {times} as far as in {look.set}"
         yield look.in_motion(None, wrong, allowed, remedy)
         return
     if (fault := _upright(look)) is not None:

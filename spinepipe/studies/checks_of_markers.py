@@ -15,7 +15,7 @@ from spinepipe.effects.contract import Array
 from spinepipe.motion.marker_groups import rigid_rotations, runs
 from spinepipe.motion.skeleton import PELVIS, MarkerSet, MarkerTrial
 from spinepipe.problems import InputProblem
-from spinepipe.studies.tracking.trials import STANCE
+from spinepipe.studies.recordings import STANCE
 from spinepipe.units import MM_PER_M
 
 LONGEST_GAP_S = 0.5
@@ -65,7 +65,7 @@ class LoadedTrial:
         ground while all coordinates are zero.
     axes : what forwards, up and right are in the axes of the file.
     file : of the motion. trials : name of the table of trials, line : of the trial in it.
-    first : number of the trial's first frame in the file.
+    first : number of the trial's first frame in the file. set : where the set stands, in messages.
     """
 
     trial: MarkerTrial
@@ -76,6 +76,7 @@ class LoadedTrial:
     trials: str
     line: int
     first: int
+    set: str = "marker_set.csv"
 
     @cached_property
     def turned(self) -> tuple[Array, NDArray[np.bool_]]:
