@@ -115,7 +115,7 @@ class Rows(Panel):
         if self.log:
             log_ticks(axes.xaxis, *axes.get_xlim())
         else:  # as many ticks whatever the width, which the layout is still to find
-            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+            axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         low, high = axes.get_xlim()
         if not self.log and low < 0.0 < high:
             axes.axvline(0.0, color=COLORS["soft"], lw=0.8, zorder=1)

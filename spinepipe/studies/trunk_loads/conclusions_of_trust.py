@@ -187,7 +187,8 @@ def _samples(tables: Tables) -> Iterator[Conclusion]:
     source = "intervals: n_samples, n_failed and n_above, over tasks"
     values = numbers_from(source, lost=lost, samples=drawn, above=above)
     values |= numbers_from("intervals", tasks=empty, open=opened - empty, fewest=LEAST_SAMPLES)
-    verdict = "stop" if empty else "check" if lost else "check_above" if above else "ok"
+    some = "check_open" if opened > empty else "check" if lost else "check_above" if above else "ok"
+    verdict = "stop" if empty else some
     yield Conclusion("samples", verdict, values | people_mpa())
 
 
