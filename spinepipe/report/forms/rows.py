@@ -90,8 +90,8 @@ class Rows(Panel):
             axes.set_xlim(*self.x_limits)
         else:  # open ends go to the edge, which lies beyond all symbols
             columns = self.frame.columns.intersection(["value", "low", "high"])
-            told = self.frame[columns].to_numpy(float)
-            axes.update_datalim([(x, 0.0) for x in told[np.isfinite(told)]])
+            numbers = self.frame[columns].to_numpy(float)
+            axes.update_datalim([(x, 0.0) for x in numbers[np.isfinite(numbers)]])
             axes.autoscale_view(scaley=False)
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
