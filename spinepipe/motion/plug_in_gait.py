@@ -47,17 +47,16 @@ def marker_places(names: Sequence[str]) -> dict[str, int]:
     Case, blanks, hyphens and underscores do not count, nor what stands before the name with a
     colon or an underscore, as `Anna:LASI` or `subject_lasi`. The exact name goes first.
     """
+    spellings = (
+        list(names),
+        [re.sub(r"[\W_]", "", text).upper() for text in names],
+        [re.split(r"[:_.]", text)[-1].strip().upper() for text in names],
+    )
     found = {}
     for name in (*NEEDED, "RBAK"):
-        for rule in (
-            lambda text: text,
-            lambda text: re.sub(r"[\W_]", "", text).upper(),
-            lambda text: re.split(r"[:_.]", text)[-1].strip().upper(),
-        ):
-            fits = [k for k, text in enumerate(names) if rule(text) == name]
-            if len(fits) == 1:
-                found[name] = fits[0]
-                break
+        fits = [one.index(name) for one in spellings if one.count(name) == 1]
+        if fits:
+            found[name] = fits[0]
     return found
 
 

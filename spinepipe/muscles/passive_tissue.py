@@ -35,7 +35,7 @@ PRELOADS_N, PRELOAD_FACTORS = zip(*several(__name__, "stiffening_by_preload").va
 _STRETCHED = numbers(__name__, "passive_muscle")
 
 LIGAMENT_ARM_M = number(__name__, "ligament_arm")
-LIGAMENTS_BESIDE_L5S1 = numbers(__name__, "ligaments_beside_l5s1")
+LIGAMENTS_BESIDE_LOWEST = numbers(__name__, "ligaments_beside_lowest")
 """Their moment in full flexion over that at L5S1."""
 
 LUMBAR_FLEXION_DEG = number(__name__, "lumbar_full_flexion")

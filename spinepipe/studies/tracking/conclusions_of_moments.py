@@ -32,7 +32,7 @@ def conclusions_of_moments(study: Tracking, tables: Tables) -> Iterator[Conclusi
     if own.empty:
         yield Conclusion("moment", "none")
         return
-    top = own.loc[own["extension_nm"].idxmax()]
+    top = own.iloc[int(own["extension_nm"].argmax())]
     source = "joint_moments: extension_nm"
     values = {
         "most": Value(float(top["extension_nm"]), "N m", source=source),

@@ -40,26 +40,33 @@ ABOUT_LIFT_OFF_S = 0.15
 
 WAYS = ("moving", "still")
 
+Rows = list[dict[str, Any]]
+
 
 def run(
     root: str, study: str, tables: Sequence[str], joint_moments: str, moment_agreement: str
 ) -> None:
     """Write both tables; there are no tables to read."""
     settings, cohort = study_of_kind(Tracking, root, study)
-    rows, agreement = [], []
-    for specimen in cohort.specimen_names:
-        for motion in motions_of(settings, cohort, specimen):
-            known = {"specimen": specimen, "trial": motion.name}
-            found = {way: net_moments(motion.joints, getattr(motion, name)) for way, name in _READ}
-            rows += [known | row for row in moment_rows(motion, found)]
-            beside = measured_of(cohort, specimen, motion.name)
-            agreement += [known | row for row in agreement_rows(motion, found, beside)]
+    rows, agreement = table_rows(settings, cohort)
     made_by = provenance("joint_moments", settings, cohort, None, digests_of_lifts(cohort))
     write(from_rows(JOINT_MOMENTS, rows), joint_moments, made_by)
     write(from_rows(MOMENT_AGREEMENT, agreement), moment_agreement, made_by)
 
 
-_READ = tuple(zip(WAYS, ("loads", "still"), strict=True))
+def table_rows(settings: Tracking, cohort: Cohort) -> tuple[Rows, Rows]:
+    """Rows of `joint_moments`, and of `moment_agreement`."""
+    rows, agreement = Rows(), Rows()
+    for specimen in cohort.specimen_names:
+        for motion in motions_of(settings, cohort, specimen):
+            known = {"specimen": specimen, "trial": motion.name}
+            both = zip(WAYS, (motion.loads, motion.still), strict=True)
+            found = {way: net_moments(motion.joints, loads) for way, loads in both}
+            rows += [known | row for row in moment_rows(motion, found)]
+            beside = measured_of(cohort, specimen, motion.name)
+            agreement += [known | row for row in agreement_rows(motion, found, beside)]
+    return rows, agreement
+
 
 Found = Mapping[str, tuple[Array, Array]]
 """Forces (F, 17, 3) N and moments (F, 17, 3) N m with accelerations and without, by `WAYS`."""

@@ -10,13 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.frames import rotation_zxy
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.motion import skeleton
 from spinepipe.motion.recorded_motion import RecordedMotion
-from spinepipe.motion.standing_spine import StandingSpine, standing_spine
+from spinepipe.motion.standing_spine import standing_spine
 from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.strength import HeldTask, hold_task
@@ -33,14 +34,14 @@ from spinepipe.studies.trunk_loads.persons import (
     extra_inputs,
     solver_options,
 )
-from spinepipe.studies.trunk_loads.postures import between
+from spinepipe.studies.trunk_loads.postures import between, shares
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, level_rows, path_rows
 from spinepipe.studies.trunk_loads.sampling import values_at
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.spread import LEAST_SAMPLES, MOST_FAILED
 from spinepipe.studies.trunk_loads.tables import LIFT_BANDS, LIFT_FRAMES, LIFT_LOADS, LIFT_PATHS
 from spinepipe.tables import from_rows, write
-from spinepipe.units import DEG_PER_RAD, MM_PER_M
+from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
 
 LIFTED = "load"
 """Part of a recorded motion that is no part of the body."""
@@ -56,7 +57,7 @@ def run(root: str, study: str, specimen: str, trial: str, **paths: str) -> None:
     settings, cohort = study_of_kind(TrunkLoads, root, study)
     progress = Progress(lambda line: print(f"{study}: {line}", file=sys.stderr, flush=True))
     stands = UprightPerson.of_cohort(settings, cohort, specimen)
-    motion = recorded_motion(cohort, specimen, trial, spine_of(stands.person))
+    motion = lift_of(cohort, specimen, trial, stands.person)
     rows = rows_of(settings, stands, motion, progress)
     place = {"specimen": specimen, "trial": trial}
     others = [*extra_inputs(settings, cohort), *motion_digests(cohort, specimen)]
@@ -67,10 +68,17 @@ def run(root: str, study: str, specimen: str, trial: str, **paths: str) -> None:
         write(from_rows(table, whole), paths[table.name], made_by)
 
 
-def spine_of(person: Person) -> StandingSpine:
-    """The spine whose joints and slices the muscles hold."""
-    trunk = person.lines.trunk
-    return standing_spine(person.subject, trunk, person.chain, person.upright, person.masses)
+def lift_of(cohort: Cohort, specimen: str, trial: str, person: Person) -> RecordedMotion:
+    """A recorded lift of the spine whose joints and slices the muscles hold.
+
+    Joints share what the trunk bends against the pelvis as they do in tasks: ligaments, which are
+    steep at the end of a joint's range, are made for that.
+    """
+    trunk, sharing = person.lines.trunk, np.zeros((len(skeleton.JOINTS), len(ROTATIONS)))
+    for column, axis in enumerate(ROTATIONS):
+        sharing[: len(LEVELS), column] = shares(axis)
+    spine = standing_spine(person.subject, trunk, person.chain, person.upright, person.masses)
+    return recorded_motion(cohort, specimen, trial, spine, shares=sharing)
 
 
 def rows_of(

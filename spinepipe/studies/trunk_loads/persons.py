@@ -18,7 +18,7 @@ from spinepipe.muscles.myo_sim import origin_of_myo_sim, source_of_myo_sim
 from spinepipe.muscles.passive_tissue import (
     AXIAL_N_PER_M,
     CURVES,
-    LIGAMENTS_BESIDE_L5S1,
+    LIGAMENTS_BESIDE_LOWEST,
     LUMBAR_FLEXION_DEG,
     T11T12_WITH_RIBS,
     JointLaws,
@@ -192,7 +192,7 @@ def laws_of(settings: TrunkLoads, source: Trunk, size: BeamRatios, values: Value
     # joints share full flexion as they share any
     shared = shares("extension")
     full = LUMBAR_FLEXION_DEG / DEG_PER_RAD * shared / shared[:-1].sum()
-    beside = np.array([LIGAMENTS_BESIDE_L5S1[level] for level in LEVELS])
+    beside = np.array([LIGAMENTS_BESIDE_LOWEST[level] for level in LEVELS])
     beside[-1] *= not with_ribs  # a whole segment has its own
     ligaments = Ligaments(passive.ligaments_nm * angular[0, 2] * beside, full)
     shear = published("gould_2024b")["uniform_stiffness"]

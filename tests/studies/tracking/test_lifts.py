@@ -20,7 +20,6 @@ from spinepipe import cohort as cohorts
 from spinepipe.cohort import Cohort
 from spinepipe.motion.joint_tables import USUAL_SHARES
 from spinepipe.motion.reading import read_motion
-from spinepipe.motion.recorded_motion import net_moments
 from spinepipe.motion.smoothing import USUAL_CUTOFF_HZ
 from spinepipe.muscles.pose import BEHIND_MM
 from spinepipe.muscles.upright import USUAL_START_DEG
@@ -28,12 +27,7 @@ from spinepipe.problems import InputError
 from spinepipe.studies.checks_of_recorded import recorded_problems
 from spinepipe.studies.recorded_motion import recorded_motion
 from spinepipe.studies.registry import every_form
-from spinepipe.studies.tracking.joint_moments import (
-    agreement_rows,
-    measured_of,
-    moment_rows,
-    motions_of,
-)
+from spinepipe.studies.tracking.joint_moments import table_rows
 from spinepipe.studies.tracking.settings import Tracking
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
@@ -42,17 +36,10 @@ STUDY = Tracking(study="lifts", kind="tracking", cohort="stoop_lift", marker_set
 
 @pytest.fixture(scope="module")
 def agreement() -> pd.DataFrame:
-    rows = []
-    for motion in motions_of(STUDY, lifts.lifts(), "s01"):
-        both = zip(("moving", "still"), (motion.loads, motion.still), strict=True)
-        found = {way: net_moments(motion.joints, loads) for way, loads in both}
-        if motion.name == "lift1":
-            table = list(moment_rows(motion, found))
-            assert len(table) == 17 * len(motion.time_s)
-            assert sum(row["largest"] for row in table) == 17
-        beside = measured_of(lifts.lifts(), "s01", motion.name)
-        rows += [{"trial": motion.name, **row} for row in agreement_rows(motion, found, beside)]
-    return pd.DataFrame(rows)
+    rows, beside = table_rows(STUDY, lifts.lifts())
+    assert len(rows) == 17 * (181 + 196 + 200)
+    assert sum(row["largest"] for row in rows) == 17 * len(lifts.TRIALS)
+    return pd.DataFrame(beside)
 
 
 def test_moments_are_those_that_were_measured_from_the_feet(agreement: pd.DataFrame) -> None:

@@ -10,7 +10,7 @@ from tracked_study import Run
 
 from spinepipe.motion.skeleton import BODIES, JOINTS
 from spinepipe.studies.tracking import approaches, calibrate, profile
-from spinepipe.studies.tracking.kind import KIND
+from spinepipe.studies.tracking.kind import KIND, TrackingFiles
 from spinepipe.tables import read_frame
 
 STUDY = """\
@@ -255,4 +255,7 @@ def test_a_size_that_markers_do_not_tell_is_a_status(tmp_path: Path) -> None:
 
 
 def test_every_declared_table_is_one_that_a_study_can_have(whole: Run) -> None:
-    assert {table.name for table in KIND.tables} == set(whole.files.tables)
+    of_lifts = {"joint_moments", "moment_agreement"}
+    assert {table.name for table in KIND.tables} - of_lifts == set(whole.files.tables)
+    lifts = whole.files.study.model_copy(update={"marker_set": "plug_in_gait"})
+    assert set(TrackingFiles.of(lifts, whole.expected.cohort).tables) == of_lifts

@@ -16,7 +16,6 @@ from spinepipe.muscles.strength import hold_task
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.progress import Progress
 from spinepipe.status import HELD
-from spinepipe.studies.recorded_motion import recorded_motion
 from spinepipe.studies.recordings import RECORDED
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.kind import PER_LIFT, TrunkFiles
@@ -24,9 +23,9 @@ from spinepipe.studies.trunk_loads.lifts import (
     LIFTED,
     band_rows,
     held_in_turn,
+    lift_of,
     of_mass,
     rows_of,
-    spine_of,
     tasks_of,
 )
 from spinepipe.studies.trunk_loads.persons import UprightPerson
@@ -54,7 +53,7 @@ def stands() -> UprightPerson:
 
 @cache
 def lift() -> RecordedMotion:
-    return recorded_motion(cohort(), "s01", "lift1", spine_of(stands().person))
+    return lift_of(cohort(), "s01", "lift1", stands().person)
 
 
 @cache
