@@ -7,6 +7,7 @@ keeps its force meanwhile: it is no stiffer because muscles contract harder.
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import linprog
@@ -41,6 +42,8 @@ _NO_FINITE_PA = 1e9
 
 _MPA = 1e-6
 
+Least = Literal["sought", "of_posture", "untold"]
+
 
 @dataclass(frozen=True, eq=False)
 class HeldTask:
@@ -52,8 +55,8 @@ class HeldTask:
     asked : at the stress that was asked for.
     person, task : at the stress of `solved`, for whatever is asked of them further.
     least_pa : least largest active stress that holds it, Pa, in the posture of `solved`; of a task
-        that is not held in the last one that was tried. None: no finite stress does, or it was
-        not sought.
+        that is not held in the last one that was tried. None: no finite stress does, or it is
+        not told.
     short_of, short_at : what a task that is not held lacks, arms or strength, and the joint where
         most is lacking; else None.
     solves : how often the task was solved.
@@ -73,15 +76,15 @@ def hold_task(
     person: Person,
     task: Task,
     options: SolverOptions,
-    seek_least: bool = False,
+    least: Least = "of_posture",
     nearby: SolvedTask | None = None,
 ) -> HeldTask:
     """A task with the forces that hold it, at the stress asked for or the least above that does.
 
     Parameters
     ----------
-    seek_least : whether the least stress is sought where less than what was asked for does; else
-        it is not told there.
+    least : whether the least stress is sought where less than what was asked for does, or told of
+        the posture that was found, or not told there.
     nearby : a task much like it, such as the frame before, whose forces shorten the way.
 
     Raises
@@ -92,9 +95,12 @@ def hold_task(
     asked = solve_task(person, task, options, nearby=nearby)
     now = HeldTask(asked, asked, person, task, None)
     # with L5S1 balanced alone, what other joints ask for is not to be made
-    if options.lowest_alone or (_is_held(now, options) and not seek_least):
+    done = options.lowest_alone or (_is_held(now, options) and least != "sought")
+    if done and least == "untold":
         return now
     now = replace(now, least_pa=_least_pa(asked, options))
+    if done:
+        return now
     best, too_little, solves = None, 0.0, 1
     while solves < _MOST_SOLVES:
         stress = np.inf if now.least_pa is None else _ABOVE_LEAST * now.least_pa
@@ -110,11 +116,11 @@ def hold_task(
         now, solves = _at(person, task, stress, options, now), solves + 1
     if best is None:
         return replace(_not_held(now, person, task), solves=solves)
-    least = min(best.task.stress_pa, best.least_pa or np.inf)
+    takes = min(best.task.stress_pa, best.least_pa or np.inf)
     if best.task.stress_pa <= task.stress_pa:
-        return HeldTask(asked, asked, person, task, least, solves=solves)
+        return HeldTask(asked, asked, person, task, takes, solves=solves)
     solved = above_asked(best.solved, task, best.task)
-    return replace(best, solved=solved, least_pa=least, solves=solves)
+    return replace(best, solved=solved, least_pa=takes, solves=solves)
 
 
 def above_asked(solved: SolvedTask, asked: Task, held: Task) -> SolvedTask:
