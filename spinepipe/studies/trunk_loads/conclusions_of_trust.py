@@ -205,7 +205,11 @@ def _held(tasks: pd.DataFrame) -> Conclusion:
     source = "tasks: status and short_of"
     values = numbers_from(source, pairs=len(tasks), usual=n[Balanced.CONVERGED], above=above)
     values |= numbers_from(source, lost=lost, **refused)
-    why = listed(REFUSED[cause].format(many) for cause, many in refused.items() if many)
+    why = listed(
+        REFUSED[cause].format("all" if many == lost else many)
+        for cause, many in refused.items()
+        if many
+    )
     verdict = "stop" if lost else "check" if above else "ok"
     return Conclusion("held", verdict, values | people_mpa(), {"why": why})
 
