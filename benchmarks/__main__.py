@@ -33,6 +33,7 @@ from benchmarks import (
     summary,
     tracking,
     trunk,
+    trunk_beside,
 )
 from benchmarks.memory import processes
 from benchmarks.timing import machine
@@ -65,7 +66,9 @@ def main() -> None:
     }
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
-        "part", nargs="*", help=f"{', '.join(parts)}; or: commands OLD; equilibria OLD"
+        "part",
+        nargs="*",
+        help=f"{', '.join(parts)}; or: commands OLD; equilibria OLD; trunk_beside OLD",
     )
     given = os.environ.get(real_geometry.COHORT_VARIABLE)
     parser.add_argument("--cohort", default=given, help="folder of a cohort, for real_geometry")
@@ -76,6 +79,9 @@ def main() -> None:
     options = parser.parse_args()
     if options.part[:1] == ["commands"]:
         commands_part(*options.part[1:])
+        return
+    if options.part[:1] == ["trunk_beside"]:
+        trunk_beside_part(*options.part[1:])
         return
     if options.part[:1] == ["equilibria"]:
         equilibria_part(*options.part[1:])
@@ -178,9 +184,25 @@ def equilibria_part(old: str) -> None:
     ]
     lines += ["| what | HEAD us | older us | ratio |", "|---|---|---|---|"]
     found = equilibria.beside(old)
-    lines += [f"| {what} | {new:.1f} | {was:.1f} | {was / new:.2f} |" for what, new, was in found]
+    lines += [_beside_line(*row) for row in found]
     print(*lines, sep="\n", flush=True)
     _write("equilibria", lines, {"machine": _about(), "older": old, "figures": found})
+
+
+def trunk_beside_part(old: str) -> None:
+    """Samples of a person in twelve tasks and a recorded lift at HEAD and at an older commit."""
+    lines = [*_head("Trunk loads, paired", _about()), "", f"CPU s, HEAD beside {old}, least.", ""]
+    lines += ["Goals: 360 s for the samples, 15 s for the lift.", ""]
+    lines += ["| what | HEAD s | older s | ratio |", "|---|---|---|---|"]
+    found = trunk_beside.beside(old)
+    lines += [_beside_line(*row) for row in found]
+    print(*lines, sep="\n", flush=True)
+    _write("trunk_beside", lines, {"machine": _about(), "older": old, "figures": found})
+
+
+def _beside_line(what: str, new: float, was: float | None) -> str:
+    older = "| |" if was is None else f"{was:.1f} | {was / new:.2f} |"
+    return f"| {what} | {new:.1f} | {older}"
 
 
 def cohort_parts() -> None:

@@ -94,19 +94,26 @@ def tree_of(old: str, part: str) -> Path:
     return folder
 
 
-def beside(old: str) -> list[tuple[str, float, float]]:
+def beside(old: str) -> list[tuple[str, float, float | None]]:
     """What is measured, at HEAD and at an older commit."""
-    folder = tree_of(old, "equilibria")
+    return measured_beside(old, "equilibria", __file__)
+
+
+def measured_beside(old: str, part: str, file: str) -> list[tuple[str, float, float | None]]:
+    """Least figures that a file writes as JSON, at HEAD and at an older commit, in turn; None where
+    the older one has none of that name."""
+    folder = tree_of(old, part)
     turns: list[list[Figures]] = [[], []]
     for _ in range(TURNS):
         for found, tree in zip(turns, (ROOT, folder), strict=True):
             place = {"PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-            run = [sys.executable, __file__]
+            run = [sys.executable, file]
             said = subprocess.run(
                 run, cwd=tree, env=os.environ | place, stdout=subprocess.PIPE, check=True
             )
             found.append(json.loads(said.stdout))
-    return [(name, *(min(one[name] for one in side) for side in turns)) for name in turns[0][0]]
+    least = [{name: min(one[name] for one in side) for name in side[0]} for side in turns]
+    return [(name, new, least[1].get(name)) for name, new in least[0].items()]
 
 
 if __name__ == "__main__":

@@ -43,8 +43,13 @@ class Balanced(StrEnum):
     """Outcome of finding the muscle forces of a trunk (`spinepipe.muscles.muscle_equilibrium`)."""
 
     CONVERGED = "converged"
+    CONVERGED_ABOVE = "converged_above"
     BEYOND_STRENGTH = "beyond_strength"
     NOT_CONVERGED = "not_converged"
     CYCLING = "cycling"
     TWO_ANSWERS = "two_answers"
     OUT_OF_REACH = "out_of_reach"
+
+
+HELD = (Balanced.CONVERGED.value, Balanced.CONVERGED_ABOVE.value)
+"""Status of tasks whose numbers are a solution: within the stress that was asked for, or above."""

@@ -10,7 +10,7 @@ from spinepipe.muscles.masses import Load, arm_loads
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import BodyPoses, cross
 from spinepipe.muscles.scaling import DIAPHRAGM_AHEAD_M
-from spinepipe.muscles.task import Task
+from spinepipe.muscles.task import Instant, Task
 from spinepipe.muscles.trunk import BODIES, SLICES, THORAX, body_of
 
 _SACRUM = 0
@@ -54,6 +54,8 @@ def applied_loads(person: Person, task: Task, poses: BodyPoses) -> AppliedLoads:
     ValueError
         For a load that the arms do not reach.
     """
+    if task.instant is not None:
+        return _loads_of_instant(person, task, task.instant, poses)
     trunk, exertion = person.lines.trunk, task.exertion
     carrier = body_of(exertion.at)
     bodies, centres, weights = person.weights
@@ -83,6 +85,22 @@ def applied_loads(person: Person, task: Task, poses: BodyPoses) -> AppliedLoads:
         np.concatenate([bodies, [load.body for load in arms], [carrier, THORAX, _SACRUM]]),
         np.concatenate([hung, [*(load.at for load in arms), at, lift.at, lift.at]]),
         np.concatenate([weights, [*(load.force for load in arms), force, lift.force, -lift.force]]),
+        turning,
+    )
+
+
+def _loads_of_instant(
+    person: Person, task: Task, instant: Instant, poses: BodyPoses
+) -> AppliedLoads:
+    """What the inverse dynamics has, where it has it, and the pressure."""
+    t11 = poses.of(np.array(THORAX), person.lines.trunk.vertebrae[SLICES.index("T11")])
+    lift = diaphragm_load(task.pressure_pa, person.diaphragm_m2, t11, poses.rotations[THORAX])
+    turning = np.zeros((len(BODIES), 3))
+    np.add.at(turning, instant.bodies, instant.moments)
+    return AppliedLoads(
+        np.concatenate([instant.bodies, [THORAX, _SACRUM]]),
+        np.vstack([poses.centres[0] + instant.at, lift.at, lift.at]),
+        np.vstack([instant.forces, lift.force, -lift.force]),
         turning,
     )
 

@@ -45,29 +45,34 @@ class Forces:
 
     Attributes
     ----------
-    multipliers : (L + 2,) of the rows and sheaths, where the demand is met; else none.
+    multipliers : (L + 2,) of the rows and sheaths where the demand is met; else those that prove
+        that no forces meet it (Farkas' lemma). None where forces were given.
+    of_rest : (L + 2,) multipliers of what is met beside the slack; None where all is met.
     """
 
     forces: Array
     slack: Array
     enough: bool
     multipliers: Array | None = None
+    of_rest: Array | None = None
 
 
 def least_stress(demand: Demand, nearby: Forces | None = None) -> Forces:
     """Forces with the least sum of squared stress; those of a demand nearby, where they are known,
     shorten the way and change nothing."""
-    start = None if nearby is None else nearby.multipliers
+    start, rest = (None, None) if nearby is None else (nearby.multipliers, nearby.of_rest)
     found, multipliers = _quadratic(demand, demand.required, start=start)
     if found is not None:
         return Forces(found, demand.required - demand.arms @ found, True, multipliers)
+    # the lemma holds for any multiple, and one of size 1 is near those of a demand that can be met
+    proof = multipliers / np.abs(multipliers).max()
     slackest = least_slack_forces(demand)
     slack = demand.required - demand.arms @ slackest
     # 1e-5 N m more may be left over: the linear programme meets its rows to its own tolerance
-    found, _ = _quadratic(demand, demand.required - slack, tolerance=1e-5)
+    found, rest = _quadratic(demand, demand.required - slack, tolerance=1e-5, start=rest)
     if found is None:
         found = slackest
-    return Forces(found, demand.required - demand.arms @ found, False)
+    return Forces(found, demand.required - demand.arms @ found, False, proof, rest)
 
 
 def _quadratic(

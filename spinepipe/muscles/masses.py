@@ -14,6 +14,7 @@ import numpy as np
 from spinepipe.anatomy.segments import CENTRE, MASS_PERCENT, Sex
 from spinepipe.effects.contract import Array
 from spinepipe.facts import numbers
+from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.task import Hands
 from spinepipe.muscles.trunk import SIDES, SLICES, THORAX, Mass, Trunk, body_of
@@ -28,6 +29,10 @@ AHEAD_AT = numbers(__name__, "slice_ahead")
 HALF_GRIP_M = 0.15
 """How far each hand is from the middle of a load that both hold: a choice, a crate 30 cm wide."""
 
+FARTHEST_LEAN_DEG = 90
+"""How far a trunk is tried to lean further for what is out of reach."""
+
+_ROUNDING_M = 1e-9
 
 ARM_LENGTH_PERCENT = numbers(__name__, "arm_length_percent")
 """Lengths of the segments of an arm, shoulder to fingertip, of body height; only ratios count."""
@@ -134,11 +139,19 @@ def arm_loads(
     Raises
     ------
     ValueError
-        If a hand is farther from its shoulder than the arm is long.
+        If a hand is farther from its shoulder than the arm is long: by how much, and how far the
+        trunk would have to lean.
     """
     carried: list[Mass] = []
-    for side, shoulder in zip(SIDES, shoulders, strict=True):
-        hand = _hand(side, shoulder, hands, arm_length)
+    places = _places(shoulders, hands, arm_length)
+    beyond = _beyond(shoulders, places, arm_length)
+    if max(beyond) > 0.0:
+        side = SIDES[int(np.argmax(beyond))]
+        raise ValueError(
+            f"the {side} hand is {1e3 * max(beyond):.0f} mm farther from the shoulder than the arm "
+            f"is long ({1e3 * arm_length:.0f} mm); {_what_reaches(shoulders, hands, arm_length)}"
+        )
+    for side, shoulder, hand in zip(SIDES, shoulders, places, strict=True):
         carried += arm_masses(side, shoulder, hand, subject)
         if hands.kg > 0.0 and hands.holding in ("both", side):
             kg = hands.kg * (0.5 if hands.holding == "both" else 1.0)
@@ -175,16 +188,27 @@ def centre_shares(sex: Sex) -> tuple[float, ...]:
     return tuple(float(centre / centres[-1]) for centre in centres)
 
 
-def _hand(side: str, shoulder: Array, hands: Hands, arm_length: float) -> Array:
-    """(3,) m, where the hand of a side is."""
-    if hands.at is None or hands.holding not in ("both", side):
-        return shoulder - np.array([0.0, arm_length, 0.0])
-    outwards = {"right": 1.0, "left": -1.0}[side] if hands.holding == "both" else 0.0
-    hand = hands.at + np.array([0.0, 0.0, outwards * HALF_GRIP_M])
-    beyond = float(np.linalg.norm(hand - shoulder)) - arm_length
-    if beyond > 0.0:
-        raise ValueError(
-            f"the {side} hand is {1e3 * beyond:.0f} mm farther from the shoulder than the arm is "
-            f"long ({1e3 * arm_length:.0f} mm)"
-        )
-    return hand
+def _places(shoulders: Array, hands: Hands, arm_length: float) -> Array:
+    """(2, 3) m, where the right and the left hand are."""
+    found = shoulders - np.array([0.0, arm_length, 0.0])
+    for k, side in enumerate(SIDES):
+        if hands.at is not None and hands.holding in ("both", side):
+            outwards = (HALF_GRIP_M, -HALF_GRIP_M)[k] if hands.holding == "both" else 0.0
+            found[k] = hands.at + np.array([0.0, 0.0, outwards])
+    return found
+
+
+def _beyond(shoulders: Array, places: Array, arm_length: float) -> list[float]:
+    """m by which each hand is too far."""
+    away: list[float] = np.linalg.norm(places - shoulders, axis=1).tolist()
+    return [one - arm_length if one > arm_length + _ROUNDING_M else 0.0 for one in away]
+
+
+def _what_reaches(shoulders: Array, hands: Hands, arm_length: float) -> str:
+    """The least further lean of the trunk about L5S1 from which both arms reach, in words."""
+    for deg in range(1, FARTHEST_LEAN_DEG + 1):
+        for sign, way in ((-1.0, "forwards"), (1.0, "backwards")):
+            leant = shoulders @ rotation_zxy(sign * np.deg2rad(deg), 0.0, 0.0).T
+            if max(_beyond(leant, _places(leant, hands, arm_length), arm_length)) <= 0.0:
+                return f"a trunk that leans {deg} deg further {way} would reach"
+    return "no lean of the trunk would reach: bring the load nearer"

@@ -136,7 +136,10 @@ class TurnedPose:
     @classmethod
     def of(cls, person: Person, task: Task) -> "TurnedPose":
         """Of a person in a task."""
-        rotations = rotations_of(person.chain, angles_of(person, task))
+        if task.instant is None:
+            rotations = rotations_of(person.chain, angles_of(person, task))
+        else:
+            rotations = task.instant.turned @ rotations_of(person.chain, person.upright)
         poses = place_bodies(person.chain, rotations, np.zeros((len(LEVELS), 3)))
         unpressed = person.laws.moments(poses.turned, np.zeros(len(LEVELS)))
         return cls(poses, unpressed, person.laws.ligament_moments(poses.turned))
@@ -147,12 +150,14 @@ def solve_task(
     task: Task,
     options: SolverOptions = SolverOptions(),
     tone: float | None = None,
+    nearby: SolvedTask | None = None,
 ) -> SolvedTask:
     """Muscle forces of a task.
 
     Parameters
     ----------
     tone : least activation of every muscle, share of its largest; the task's own by default.
+    nearby : a task much like it, such as the frame before, whose forces shorten the way.
 
     Raises
     ------
@@ -160,10 +165,11 @@ def solve_task(
         For a load that the arms do not reach.
     """
     least = task.tone_share if tone is None and task.tone == "stated" else tone or 0.0
-    first = _iterate(person, task, options, least, np.zeros(len(LEVELS)))
+    still = np.zeros((len(LEVELS), 3))
+    first = _iterate(person, task, options, least, nearby.pushes if nearby else still, nearby)
     if not (options.twice and options.feedback) or first.status is not Balanced.CONVERGED:
         return first
-    again = _iterate(person, task, options, least, np.full(len(LEVELS), _HEAVY_N))
+    again = _iterate(person, task, options, least, np.array([0.0, -_HEAVY_N, 0.0]) + still)
     apart = _change(again.found.forces, first.found.forces)
     if apart > 2.0 * options.change:
         message = f"another start ends {100.0 * apart:.1f} % away"
@@ -182,15 +188,18 @@ def solve_with_forces(person: Person, task: Task, forces: Array, rounds: int = 2
 
 
 def _iterate(
-    person: Person, task: Task, options: SolverOptions, tone: float, start: Array
+    person: Person,
+    task: Task,
+    options: SolverOptions,
+    tone: float,
+    pushes: Array,
+    nearby: SolvedTask | None = None,
 ) -> SolvedTask:
-    """Rounds from a spine pressed by `start` (7,) N."""
+    """Rounds from a spine whose joints carry `pushes` (7, 3) N, disc axes."""
     turned = TurnedPose.of(person, task)
-    pushes = np.zeros((len(LEVELS), 3))
-    pushes[:, 1] = -start
     rounds: list[SolverRound] = []
     trail: list[Array] = []
-    step, last, found = 1.0, np.zeros_like(pushes), None
+    step, last, found = 1.0, np.zeros_like(pushes), nearby.found if nearby else None
     while True:
         now = _solve_round(person, task, options, tone, turned, pushes, nearby=found)
         found = now.found

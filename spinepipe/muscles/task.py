@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.effects.contract import Array
 
@@ -48,8 +49,27 @@ class Exertion:
 
 
 @dataclass(frozen=True, eq=False)
+class Instant:
+    """An instant of a recorded motion, as its inverse dynamics has it.
+
+    Attributes
+    ----------
+    turned : (8, 3, 3) rotation of each body (BODIES) since the person stood upright, ground axes.
+    bodies : (K,) index into BODIES of what carries each load.
+    at : (K, 3) m from the centre of L5S1, ground axes.
+    forces : (K, 3) N on the carrier: gravity less inertia. moments : (K, 3) N m about `at`.
+    """
+
+    turned: Array
+    bodies: NDArray[np.int64]
+    at: Array
+    forces: Array
+    moments: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Task:
-    """One thing to hold still.
+    """One thing to hold.
 
     Attributes
     ----------
@@ -63,6 +83,7 @@ class Task:
     pressure_pa : intra-abdominal pressure.
     stress_pa : largest active stress of a muscle.
     tone : co-activation; `tone_share` is the least share of the largest active force, if stated.
+    instant : in place of `turned`, weights, arms, hands and exertion; None for a task held still.
     """
 
     name: str
@@ -75,3 +96,4 @@ class Task:
     stress_pa: float = 0.6e6
     tone: Tone = "none"
     tone_share: float = 0.0
+    instant: Instant | None = None

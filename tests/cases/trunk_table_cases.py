@@ -233,9 +233,10 @@ def task_rows(size: Size) -> Iterator[Row]:
                 "l5s1_shear_n": 1.4 * one.shear,
                 "largest_slack_nm": 21.0 if one.status == "beyond_strength" else 1e-4,
                 "strength_used": one.compression / 6000.0,
+                "least_stress_mpa": one.compression / 10000.0,
                 "highest_stress_mpa": min(1.0, one.compression / 6000.0),
                 "tone_share": 0.0,
-                "stable": None if one.task != "standing_stable" else True,
+                "stable": None if one.task not in ("standing", "standing_stable") else True,
                 "iterations": 7,
             }
         yield row
@@ -471,6 +472,7 @@ def interval_rows(size: Size) -> Iterator[Row]:
                 **(ends if one.has_forces else {}),
                 "n_samples": 220 if one.has_forces else 0,
                 "n_failed": 4 if one.has_forces else 224,
+                "n_above": 0,
             }
 
 

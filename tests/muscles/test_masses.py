@@ -1,5 +1,6 @@
 """Every kilogram has a place: shares, centres, arms along a line, loads in one hand or two."""
 
+import re
 from dataclasses import replace
 from typing import Literal
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from trunk_to_scale import made_up_trunk
 
+from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.masses import (
     ahead_cm,
     arm_loads,
@@ -147,3 +149,30 @@ def test_a_hand_at_full_reach_is_within_it_and_one_beyond_is_told_with_its_dista
     far = replace(hands, at=np.array([0.8, 0.45, 0.18]))
     with pytest.raises(ValueError, match="right hand is 150 mm farther"):
         arm_loads(REFERENCE, SHOULDERS, far, arm_length=0.65)
+
+
+@pytest.mark.parametrize(
+    ("at", "says"),
+    [
+        ((0.8, 0.45, 0.18), r"a trunk that leans (\d+) deg further forwards would reach"),
+        ((-0.6, 0.1, 0.18), r"a trunk that leans (\d+) deg further backwards would reach"),
+        ((2.5, 0.0, 0.18), "no lean of the trunk would reach: bring the load nearer"),
+    ],
+)
+def test_out_of_reach_the_least_lean_that_would_do_is_told(
+    at: tuple[float, float, float], says: str
+) -> None:
+    """So much does, and a degree less does not."""
+    far = Hands(kg=5.0, at=np.array(at), holding="right")
+    with pytest.raises(ValueError, match=says) as told:
+        arm_loads(REFERENCE, SHOULDERS, far, arm_length=0.65)
+    found = re.search(says, str(told.value))
+    assert found is not None
+    for deg in map(int, found.groups()):
+        sign = -1.0 if "forwards" in says else 1.0
+        enough, less = (
+            SHOULDERS @ rotation_zxy(sign * np.deg2rad(one), 0.0, 0.0).T for one in (deg, deg - 1)
+        )
+        arm_loads(REFERENCE, enough, far, arm_length=0.65)
+        with pytest.raises(ValueError, match="farther"):
+            arm_loads(REFERENCE, less, far, arm_length=0.65)

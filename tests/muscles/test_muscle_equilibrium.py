@@ -144,7 +144,9 @@ class Rounds:
     def __init__(self, *ends: Any) -> None:
         self.ends, self.starts, self.tones = list(ends), list[Any](), list[float]()
 
-    def __call__(self, person: Any, task: Any, how: SolverOptions, tone: float, start: Any) -> Any:
+    def __call__(
+        self, _person: Any, _task: Any, _how: Any, tone: float, start: Any, *_: Any
+    ) -> Any:
         self.starts.append(start)
         self.tones.append(tone)
         return self.ends.pop(0)
@@ -175,7 +177,8 @@ def test_a_second_answer_is_one_more_than_twice_the_change_away(
     found, rounds = asked_twice(monkeypatch, SolverOptions(twice=True), *ends)
     assert (found.status, found.message) == (status, message)
     np.testing.assert_array_equal(found.found.forces, ends[0].found.forces)
-    np.testing.assert_array_equal(rounds.starts, [np.zeros(7), np.full(7, 3000.0)])
+    pressed = np.array([np.zeros(7), np.full(7, -3000.0)])[:, :, None] * [0.0, 1.0, 0.0]
+    np.testing.assert_array_equal(rounds.starts, pressed)
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,27 @@ rule hold:
         run_job("hold", rule, wildcards, input, output, params, log)
 
 
+# The frames of one recorded lift of one person.
+rule lift:
+    input:
+        outdated("lift"),
+    output:
+        **tables_in(
+            f"{TRUNKS}/jobs",
+            "lift_loads",
+            "lift_frames",
+            "lift_bands",
+            "lift_paths",
+            of="specimen-{specimen}/trial-{trial}",
+        ),
+    log:
+        f"{LOGS}/lift/specimen-{{specimen}}/{{trial}}.log",
+    params:
+        digest=digest("lift"),
+    run:
+        run_job("lift", rule, wildcards, input, output, params, log)
+
+
 rule simplify:
     input:
         outdated("simplify"),

@@ -114,6 +114,21 @@ class SceneStep:
 
 
 @dataclass(frozen=True, eq=False)
+class Course:
+    """A number over the time of a motion, drawn below its slider.
+
+    Attributes
+    ----------
+    time_s, value : (N,). at_s : of each step. says : what it is, with its largest value.
+    """
+
+    time_s: Array
+    value: Array
+    at_s: Array
+    says: str
+
+
+@dataclass(frozen=True, eq=False)
 class Scene:
     """What one choice of the viewer shows.
 
@@ -123,6 +138,7 @@ class Scene:
         between two that follow each other a disc is drawn.
     pause_ms : how long each step stands when they play.
     one_scale : whether all steps are drawn at the same scale; else each fills the view.
+    course : a curve over time; None for none.
     """
 
     title: str
@@ -133,6 +149,7 @@ class Scene:
     camera: Camera = Camera()
     pause_ms: int = 700
     one_scale: bool = True
+    course: Course | None = None
 
 
 def rotation_vector(rotation: Array) -> Array:
@@ -189,11 +206,25 @@ def scenes_as_data(scenes: Sequence[Scene]) -> dict[str, Any]:
                 {"name": b.name, "mesh": mesh_of(b.mesh), "fixed": b.fixed} for b in scene.bodies
             ],
             "steps": [_step(step, scene) for step in scene.steps],
+            **({} if scene.course is None else {"course": _course(scene.course)}),
         }
         for scene in scenes
     ]
     kept = [json.loads(text) for text in meshes]
     return {"sides": SIDES, "shapes": list(shapes), "meshes": kept, "scenes": told}
+
+
+def _course(course: Course) -> dict[str, Any]:
+    """In percent of the time and of the largest value; down is positive, as in SVG."""
+    start, end = float(course.time_s[0]), float(course.time_s[-1])
+    share = 100.0 / max(end - start, 1e-9)
+    top = max(float(course.value.max()), 1e-9)
+    line = np.column_stack([share * (course.time_s - start), 100.0 * (1.0 - course.value / top)])
+    return {
+        "line": _rows(line),
+        "at": _plain(share * (course.at_s - start), 1),
+        "says": course.says,
+    }
 
 
 def _step(step: SceneStep, scene: Scene) -> dict[str, Any]:

@@ -151,6 +151,7 @@ const SpineViewer = (function () {
     const canvas = figure.querySelector("canvas"), pen = canvas.getContext("2d");
     const find = (name) => figure.querySelector(name);
     const slider = find("input[type=range]"), says = find("output"), play = find(".play");
+    const course = find(".course");
     const chooser = find("select"), boxes = [...figure.querySelectorAll("[data-show]")];
     let scene, reach, camera, number, zoom = 1, timer = 0, waiting = false, held = null;
 
@@ -245,6 +246,9 @@ const SpineViewer = (function () {
       slider.value = String(number);
       slider.setAttribute("aria-valuetext", scene.steps[number].label);
       says.textContent = scene.steps[number].says;
+      if (scene.course) {
+        for (const end of ["x1", "x2"]) { course.querySelector("line").setAttribute(end, scene.course.at[number]); }
+      }
       redraw();
     }
     function stop() {
@@ -266,6 +270,10 @@ const SpineViewer = (function () {
       find("figcaption").textContent = scene.caption;
       find(".slider").textContent = scene.slider;
       slider.max = String(scene.steps.length - 1);
+      if (scene.course) {
+        course.querySelector("polyline").setAttribute("points", scene.course.line.join(" "));
+        course.querySelector("title").textContent = scene.course.says;
+      }
       for (const part of figure.querySelectorAll(".moves")) { part.hidden = scene.steps.length < 2; }
       moveTo(first);
     }

@@ -11,6 +11,7 @@ from spinepipe.report.forms.curves import Curves
 from spinepipe.report.forms.look import BASE, MEASURED, MODEL, SEVERAL, Look
 from spinepipe.report.forms.rows import Rows
 from spinepipe.report.words import capital, case, level, plain, short
+from spinepipe.status import HELD
 from spinepipe.studies.trunk_loads.measured import beside_measured
 from spinepipe.studies.trunk_loads.samples import Tables, spread_of
 from spinepipe.studies.trunk_loads.selection import (
@@ -68,7 +69,7 @@ def pressures(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
         keys.insert(0, Key(MEASURED, "measured"))
         keys.append(Key(MEASURED, "measured, not confirmed in print", hollow=True))
     held = "thick line: range over bodies that hold the task"
-    caption = f"{short(plain(body))}; thin line: 95 % of samples that hold the task; {held}."
+    caption = f"{short(plain(body))}; thin line: 95 % of samples, to the edge where open; {held}."
     return Chart(title, panels, capital(caption), keys)
 
 
@@ -92,7 +93,7 @@ def _compressions(tables: Tables, body: str) -> pd.DataFrame:
                 **{end: spread.get(end) for end in ("low", "high")},
                 "inner_low": float(others.min()) if several else None,
                 "inner_high": float(others.max()) if several else None,
-                "hollow": row["status"] != "converged",
+                "hollow": row["status"] not in HELD,
             }
         )
     numbers = ("low", "high", "inner_low", "inner_high")

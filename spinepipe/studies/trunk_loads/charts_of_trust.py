@@ -9,6 +9,7 @@ from spinepipe.report.forms.rows import Rows
 from spinepipe.report.words import capital, case, count, short
 from spinepipe.studies.trunk_loads.charts import MOST_ROWS, WHOLE_COURSE
 from spinepipe.studies.trunk_loads.conclusions import changes
+from spinepipe.studies.trunk_loads.conclusions_of_trust import people_mpa
 from spinepipe.studies.trunk_loads.samples import CORRELATIONS, Tables, shares
 from spinepipe.studies.trunk_loads.selection import COMPRESSION, PRESSURE, named, sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
@@ -23,34 +24,36 @@ MOST_PANELS = 4
 
 
 def strength(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
-    """Share of the model's strength that each task needs, over bodies."""
-    title = "Strength that the model needs"
+    """Least muscle stress that each task takes, over bodies, beside that of people."""
+    title = "Muscle stress that tasks take"
     tasks = tables["tasks"]
-    known = tasks.dropna(subset=["strength_used"]) if len(tasks) else tasks
+    known = tasks.dropna(subset=["least_stress_mpa"]) if len(tasks) else tasks
     if known.empty:
-        return saying(title, "Strength was not asked for.")
+        return saying(title, "No finite muscle stress holds a task.")
     few = known[(known["number"].fillna(0) != WHOLE_COURSE) & (known["tone"] == "none")]
     known = few if len(few) else known
     bodies = tasks["specimen"].nunique()
     rows = []
     for task, own in known.groupby("task", sort=False):
-        used, held = 100.0 * own["strength_used"].astype(float), int(sound(own).sum())
+        takes, held = own["least_stress_mpa"].astype(float), int(sound(own).sum())
         part = f"{held} of {bodies}" if 0 < held < bodies else ""
-        several = {"low": float(used.min()), "high": float(used.max())} if len(used) > 1 else {}
-        rows.append({"row": case(str(task)), "value": float(used.median()), "low": None,
+        several = {"low": float(takes.min()), "high": float(takes.max())} if len(takes) > 1 else {}
+        rows.append({"row": case(str(task)), "value": float(takes.median()), "low": None,
                      "high": None, **several, "hollow": held == 0, "note": part})  # fmt: skip
     frame = pd.DataFrame(rows).sort_values("value", kind="stable")[-MOST_ROWS:]
+    people = people_mpa()
     panel = Rows(
-        x_label="share of the strength needed (%)",
+        x_label="least muscle stress that holds the task (MPa)",
         frame=frame.astype({"low": float, "high": float}),
         looks={"": MODEL},
-        marks={100.0: "all there is"},
+        marks={people["highest"].number: "most in people"},
         log=True,
         width=440.0,
     )
     keys = [Key(MODEL, "held"), Key(MODEL, "held in no body", hollow=True)]
     over = f"Median and range over {count(bodies, 'body', 'bodies')}"
-    caption = f"{over}; at the right, how many hold the task where some do."
+    beside = "{lowest:number} to {highest:unit}, mean {mean:unit} (Burkhart 2018)".format(**people)
+    caption = f"{over}; at the right, how many hold the task where some do. People have {beside}."
     return Chart(title, [panel], caption, keys)
 
 

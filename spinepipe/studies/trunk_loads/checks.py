@@ -19,6 +19,7 @@ from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import InputError, InputProblem, Spelling, did_you_mean, one_of
 from spinepipe.studies.places import unknown_names
 from spinepipe.studies.plausibility import subject_doubts
+from spinepipe.studies.recordings import TRIALS
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
 from spinepipe.studies.trunk_loads.forms import MUSCLE_PARAMETERS, MUSCLES, TASKS
@@ -41,7 +42,8 @@ def check_trunk(
 ) -> Iterator[InputProblem]:
     """Everything that is wrong with the subjects, tasks and muscles of a cohort."""
     further = cohort.further
-    for form in (SUBJECTS, TASKS):
+    needed = (SUBJECTS, TRIALS) if study.motions.trials else (SUBJECTS, TASKS)
+    for form in needed:
         if form.stem not in further:
             found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
             remedy = f"add {form.file}, or name another cohort"
@@ -57,6 +59,11 @@ def check_trunk(
         file = f"{cohort.name}/{TASKS.file}"
         yield from task_problems(file, further["tasks"], tallest, study.trunk_angle)
         yield from _named(document, study, cohort, list(further["tasks"]["task"]))
+    elif study.motions.trials:
+        yield from _named(document, study, cohort, [])
+    if study.motions.trials and TRIALS.stem in further:
+        known = list(dict.fromkeys(further[TRIALS.stem]["trial"].astype(str)))
+        yield from unknown_names(document, "motions.trials", "trial", study.motions.trials, known)
     if study.geometry == "cohort":
         yield from _without_geometry(document, cohort)
         yield from _several_trunks(cohort)

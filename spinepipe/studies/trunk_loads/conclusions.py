@@ -5,11 +5,12 @@ from collections.abc import Iterator
 import pandas as pd
 
 from spinepipe.cohort import Cohort
+from spinepipe.facts import number
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.page.study_page import ResultTables
 from spinepipe.report.words import count, level, listed, plain, short
-from spinepipe.studies.trunk_loads.conclusions_of_trust import of_trust
+from spinepipe.studies.trunk_loads.conclusions_of_trust import of_trust, people_mpa
 from spinepipe.studies.trunk_loads.measured import beside_measured, counted_and_held, error
 from spinepipe.studies.trunk_loads.samples import (
     Tables,
@@ -33,10 +34,13 @@ from spinepipe.studies.trunk_loads.selection import (
     upright,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import SIMPLIFIED, task_words
+from spinepipe.studies.trunk_loads.words import SIMPLIFIED, STANDING, task_words
 
-EASY = 0.5
-"""Share of the strength: people stand upright with much less of theirs."""
+EASY = 0.4
+"""Share of the strength: people stand upright with less of theirs."""
+
+LOW_TONE = number(__name__, "standing_tone")
+"""Least share of the strength of all muscles at which people stand."""
 
 DEEP_DEG = 80.0
 """Flexion from which on the long back muscles of people are silent."""
@@ -77,6 +81,7 @@ def conclusions(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Ite
     stopped = list(_not_to_use(tasks, cohort)) if len(tasks) else []
     yield from stopped or [Conclusion("bodies", rebuilt)]
     if len(tasks):
+        yield from _standing(tasks, cohort)
         yield from _effort(tasks, cohort)
         yield from _relaxation(tasks, tables.get("muscles", pd.DataFrame()), cohort)
     if found is not None:
@@ -114,6 +119,12 @@ def _answer(
     if spread:
         lost, held = int(spread["n_failed"]), int(spread["n_samples"])
         drawn = numbers_from("intervals: n_samples and n_failed", lost=lost, samples=lost + held)
+    if pd.notna(row["least_stress_mpa"]):
+        source = "tasks: least_stress_mpa"
+        least = {"value": Value(row["least_stress_mpa"], "MPa", source=source)} | people_mpa()
+        least["allowed"] = Value(row["largest_stress_mpa"], "MPa", source="tasks")
+        beyond = least["value"].number > least["allowed"].number
+        yield Conclusion("stress", "above" if beyond else "allowed", least, names)
     sampled = "single" if load.low is None else "sampled"
     yield Conclusion("compression", sampled, {"value": load, **drawn}, names)
     own = study.volunteer is not None and row["specimen"] == study.volunteer.specimen
@@ -140,6 +151,7 @@ def _not_to_use(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
         return
     causes = {"beyond_strength": "stop_weak", "out_of_reach": "stop_reach"}
     cause = every["status"].map(causes).fillna("stop_unsolved")
+    cause = cause.mask(every["short_of"].eq("arms").fillna(value=False), "stop_arms")
     by_task = cause.groupby(every["task"], sort=False).agg(
         lambda rows: rows.iloc[0] if rows.nunique() == 1 else "stop_mixed"
     )
@@ -154,7 +166,7 @@ def _not_to_use(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
                 few = ", ".join(map(task_words, some))
                 whole = f"all {n}" if len(some) == n else f"{len(some)} of {n}"
                 told.append(f"{words} ({few if len(some) <= _MOST_NAMES else whole})")
-        values = numbers_from("tasks: status, of every body", tasks=len(own))
+        values = numbers_from("tasks: status, of every body", tasks=len(own)) | people_mpa()
         yield Conclusion(
             "not_to_use", str(verdict), values, {"which": listed(told, len(told), None)}
         )
@@ -173,22 +185,48 @@ def groups_of(tasks: pd.DataFrame, cohort: Cohort) -> dict[str, str]:
     return found
 
 
+def _standing(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
+    """Whether relaxed standing is as easy and as stable as in people, for every body."""
+    free = free_handed(tasks, cohort)
+    relaxed = free[upright(free)].dropna(subset=["strength_used", "stable"])
+    if relaxed.empty:
+        return
+    toned = tasks[(tasks["tone"] == "stable") & (tasks["hand_load_kg"] == 0.0) & upright(tasks)]
+    toned = toned[sound(toned) & toned["stable"].fillna(value=False).astype(bool)]
+    tone = toned.groupby("specimen")["tone_share"].min()
+    falling = relaxed[~relaxed["stable"].astype(bool)]["specimen"]
+    needed = falling.map(tone).astype(float)
+    values = {
+        "share": Value(100.0 * float(relaxed["strength_used"].max()), "%", source="tasks"),
+        "easy": Value(100.0 * EASY, "%"),
+        "low": Value(100.0 * LOW_TONE, "%", source="own estimate"),
+        "tone": Value(100.0 * float(needed.max()) if len(needed.dropna()) else 0.0, "%"),
+    }
+    faults = {
+        "held": not sound(relaxed).all(),
+        "strong": sound(relaxed).all() and values["share"].number >= 100.0 * EASY,
+        "toned": bool(needed.max() > LOW_TONE),
+        "falls" if (tasks["tone"] == "stable").any() else "unsought": bool(needed.isna().any()),
+    }
+    why = listed(STANDING[name].format(**values) for name, one in faults.items() if one)
+    yield Conclusion("standing", "fails" if why else "passes", values, {"why": why})
+
+
 def _effort(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
     """Whether the model's muscles do what people do easily: tasks with empty hands."""
-    free = free_handed(tasks, cohort).dropna(subset=["strength_used"])
+    free = free_handed(tasks, cohort)
+    free = free[free["least_stress_mpa"].notna() | free["short_of"].eq("arms").fillna(value=False)]
     if free.empty:
         return
-    worst = named(free.sort_values("strength_used", kind="stable"))[-1]
-    source = "tasks: strength_used, empty hands, largest of all bodies"
-    values = {"worst": Value(100.0 * worst["strength_used"], "%", source=source)}
-    names = {"task": task_words(worst["task"])}
-    standing = free[upright(free)]["strength_used"]
-    share = float(standing.max()) if len(standing) else 0.0
-    if len(standing):
-        values["standing"] = Value(100.0 * share, "%", source=source)
-    weak = "weak" if len(standing) else "weak_task"
-    fails = share > EASY or worst["strength_used"] > 1.0
-    yield Conclusion("effort", weak if fails else "enough", values, names)
+    worst = named(free.sort_values("least_stress_mpa", kind="stable", na_position="last"))[-1]
+    names, values = {"task": task_words(worst["task"])}, people_mpa()
+    if pd.isna(worst["least_stress_mpa"]):
+        yield Conclusion("effort", "arms", values, names)
+        return
+    source = "tasks: least_stress_mpa, empty hands, largest of all bodies"
+    values["worst"] = Value(worst["least_stress_mpa"], "MPa", source=source)
+    fails = values["worst"].number > values["highest"].number
+    yield Conclusion("effort", "weak" if fails else "enough", values, names)
 
 
 def _relaxation(tasks: pd.DataFrame, muscles: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:

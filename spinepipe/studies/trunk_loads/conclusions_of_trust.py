@@ -4,15 +4,12 @@ from collections.abc import Iterator
 
 import pandas as pd
 
+from spinepipe.muscles.strength import HIGHEST_PA, LOWEST_PA, MEAN_PA
 from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import listed, plain
+from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.measured import FEWEST, counted_and_held, error
-from spinepipe.studies.trunk_loads.samples import (
-    Tables,
-    carried_by_lost,
-    lost_and_all,
-    shares,
-)
+from spinepipe.studies.trunk_loads.samples import LEAST_SAMPLES, Tables, lost_and_all, shares
 from spinepipe.studies.trunk_loads.selection import (
     COMPRESSION,
     PRESSURE,
@@ -22,26 +19,21 @@ from spinepipe.studies.trunk_loads.selection import (
     sound,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import assumed, input_words, task_words
+from spinepipe.studies.trunk_loads.words import REFUSED, assumed, input_words, task_words
 
 TELLABLE_MPA = 0.1
 """Two series of one man's measurements differ by this (Wilke 1999 and 2001, load held close)."""
-
-BIASED = 0.05
-"""Share of a load: lost samples that carry more or less than others by this shift the interval."""
-
-LOADS = {
-    COMPRESSION: "compression of L4–L5",
-    PRESSURE: "pressure in L4–L5",
-    "l4l5_shear_n": "shear of L4–L5",
-    "l5s1_compression_n": "compression of L5–S1",
-    "l5s1_shear_n": "shear of L5–S1",
-}
 
 LOADED = {"pressure": PRESSURE, "compression": COMPRESSION}
 """Loads whose spread is told."""
 
 _MOST_NAMES = 4
+
+
+def people_mpa() -> dict[str, Value]:
+    """Largest stress of people's trunk extensors: lowest, mean and highest of persons."""
+    ends = {"lowest": LOWEST_PA, "mean": MEAN_PA, "highest": HIGHEST_PA}
+    return {name: Value(1e-6 * pa, "MPa", source="Burkhart 2018") for name, pa in ends.items()}
 
 
 def of_trust(
@@ -73,7 +65,7 @@ def of_trust(
 
 def _inside(beside: pd.DataFrame) -> Iterator[Conclusion]:
     """Whether confirmed measured pressures lie inside the intervals of the computed ones."""
-    sampled = beside.dropna(subset=["low", "high"])
+    sampled = beside.dropna(subset=["low"])  # an end that is open holds all above
     known = sampled[sampled["confirmed"]]
     if known.empty:
         return
@@ -189,41 +181,37 @@ def _samples(tables: Tables) -> Iterator[Conclusion]:
     if rows.empty:
         return
     lost, drawn = lost_and_all(rows)
-    empty = rows[rows["low"].isna()].drop_duplicates(["specimen", "task"])
-    source = "intervals: n_samples and n_failed, over tasks"
-    values = numbers_from(source, lost=lost, samples=drawn, tasks=len(empty))
-    if not lost:
-        yield Conclusion("samples", "ok", values)
-        return
-    names, verdict = {}, "stop" if len(empty) else "check"
-    carried = carried_by_lost(tables, tuple(LOADS))
-    if verdict == "check" and carried is not None and abs(carried[0]) > BIASED:
-        more, place = carried
-        how = "responses: medians of lost and held samples"
-        values["more"] = Value(abs(100.0 * more), "%", source=how)
-        names = {"load": LOADS[place["quantity"]], "task": plain(place["task"])}
-        verdict = "check_low" if more > 0.0 else "check_high"
-    yield Conclusion("samples", verdict, values, names)
+    each = rows[rows["quantity"] == COMPRESSION]
+    empty, opened = (int(each[end].isna().sum()) for end in ("low", "high"))
+    above = int(each["n_above"].sum())
+    source = "intervals: n_samples, n_failed and n_above, over tasks"
+    values = numbers_from(source, lost=lost, samples=drawn, above=above)
+    values |= numbers_from("intervals", tasks=empty, open=opened - empty, fewest=LEAST_SAMPLES)
+    some = "check_open" if opened > empty else "check" if lost else "check_above" if above else "ok"
+    verdict = "stop" if empty else some
+    yield Conclusion("samples", verdict, values | people_mpa())
 
 
 # --- solutions ------------------------------------------------------------------------------------
 
 
 def _held(tasks: pd.DataFrame) -> Conclusion:
-    """Bodies and tasks without muscle forces that hold, by the cause."""
-    weak, reach = (
-        int((tasks["status"] == status).sum()) for status in ("beyond_strength", "out_of_reach")
+    """Bodies and tasks that muscles hold, at what stress, and those that they do not, by cause."""
+    n = {one.value: int((tasks["status"] == one.value).sum()) for one in Balanced}
+    above, beyond = n[Balanced.CONVERGED_ABOVE], n[Balanced.BEYOND_STRENGTH]
+    arms, lost = int((tasks["short_of"] == "arms").sum()), int((~sound(tasks)).sum())
+    refused = {"weak": beyond - arms, "arms": arms, "reach": n[Balanced.OUT_OF_REACH]}
+    refused["unsolved"] = lost - sum(refused.values())
+    source = "tasks: status and short_of"
+    values = numbers_from(source, pairs=len(tasks), usual=n[Balanced.CONVERGED], above=above)
+    values |= numbers_from(source, lost=lost, **refused)
+    why = listed(
+        REFUSED[cause].format("all" if many == lost else many)
+        for cause, many in refused.items()
+        if many
     )
-    lost = int((~sound(tasks)).sum())
-    values = numbers_from(
-        "tasks: status",
-        pairs=len(tasks),
-        lost=lost,
-        weak=weak,
-        reach=reach,
-        unsolved=lost - weak - reach,
-    )
-    return Conclusion("held", "stop" if lost else "ok", values)
+    verdict = "stop" if lost else "check" if above else "ok"
+    return Conclusion("held", verdict, values | people_mpa(), {"why": why})
 
 
 def _range_of_formula(held: pd.DataFrame) -> Iterator[Conclusion]:
@@ -239,7 +227,8 @@ def _left_over(held: pd.DataFrame) -> Iterator[Conclusion]:
     slack = held["largest_slack_nm"].dropna().astype(float)
     if slack.empty:
         return
-    over = held[held["strength_used"].astype(float) > 1.0]
+    as_asked = held["status"] == Balanced.CONVERGED.value
+    over = held[as_asked & (held["strength_used"].astype(float) > 1.0)]
     # to 0.001, as less is what a solver leaves
     values = {"slack": Value(round(float(slack.max()), 3), "N\u00a0m", source="tasks")}
     if len(over):

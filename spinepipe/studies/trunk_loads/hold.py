@@ -7,11 +7,10 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.muscles.masses import ARM, shares
-from spinepipe.muscles.muscle_equilibrium import solve_task
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.scaling import applied_ratios
 from spinepipe.muscles.stability import least_stable, smallest_eigenvalue
-from spinepipe.muscles.strength import capacity_left, load_factor
+from spinepipe.muscles.strength import above_asked, capacity_left, hold_task, load_factor
 from spinepipe.muscles.subject import REFERENCE
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import BODIES
@@ -99,14 +98,17 @@ def _outcome(settings: TrunkLoads, person: Person, task: Task) -> TaskOutcome:
     """A task with its stability and strength; raises where it cannot be posed."""
     options, gain = solver_options(settings, twice=True), settings.solving.stiffness_gain
     message, tone = "", task.tone_share if task.tone == "stated" else 0.0
-    found = None
+    held = hold_task(
+        person, task, options, least="sought" if settings.solving.strength else "untold"
+    )
+    found = held.solved
     if task.tone == "stable":
-        least = least_stable(person, task, options, gain)
+        least = least_stable(held.person, held.task, options, gain)
         message = "" if least else NO_TONE
-        found, tone = (least.solved, least.tone) if least else (None, 0.0)
-    found = found or solve_task(person, task, options, tone)
-    stable = smallest_eigenvalue(person, found, gain) >= 0.0
-    asked = settings.solving.strength
+        if least:
+            found, tone = above_asked(least.solved, task, held.task), least.tone
+    stable = smallest_eigenvalue(held.person, found, gain) >= 0.0
+    asked, at_asked = settings.solving.strength, found if held.task is task else held.asked
     return TaskOutcome(
         person,
         task,
@@ -114,8 +116,9 @@ def _outcome(settings: TrunkLoads, person: Person, task: Task) -> TaskOutcome:
         "; ".join(part for part in (found.message, message) if part),
         tone,
         stable,
-        load_factor(found) if asked else None,
-        capacity_left(found) if asked else None,
+        load_factor(at_asked) if asked else None,
+        capacity_left(at_asked) if asked else None,
+        held,
     )
 
 

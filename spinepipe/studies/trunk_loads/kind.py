@@ -8,6 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
+from spinepipe.studies.recordings import RECORDED, motion_digests
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
@@ -21,6 +22,12 @@ PER_PERSON = (
     *("upright", "masses", "scaling", "remarks"),
 )
 """Tables with one job file for each person."""
+
+PER_LIFT = ("lift_loads", "lift_frames", "lift_bands", "lift_paths")
+"""Tables with one job file for each person and recorded lift."""
+
+OF_TASKS = ("tasks", "levels", "muscles", "paths", "iterations", "simplified")
+"""Tables that a cohort without tasks has not."""
 
 TUNED = ("pressures", "tuning", "agreement")
 
@@ -44,10 +51,11 @@ class TrunkFiles(StudyFiles):
     Attributes
     ----------
     rebuilt : whether the cohort stands for that of a paper whose numbers are at hand.
+    tasked : whether it has tasks. lifts : trials whose frames are tasks, by person.
     """
 
     full = FULL
-    joined = (*PER_PERSON, "simplified", "responses")
+    joined = (*PER_PERSON, "simplified", "responses", *PER_LIFT)
     drawings = (
         Figure(
             "pressure_against_measured",
@@ -59,7 +67,13 @@ class TrunkFiles(StudyFiles):
         Figure(
             "tuned_pressures", "Pressures before and after fitting", "charts:tuned", ("pressures",)
         ),
-        Figure("strength", "Strength that the model needs", "charts_of_trust:strength", ("tasks",)),
+        Figure(
+            "lift_loads",
+            "Load over a lift",
+            "charts_of_lifts:over_time",
+            ("lift_loads", "lift_frames", "lift_bands"),
+        ),
+        Figure("strength", "Muscle stress that tasks take", "charts_of_trust:strength", ("tasks",)),
         Figure(
             "drivers",
             "Where the spread of the loads comes from",
@@ -96,11 +110,22 @@ class TrunkFiles(StudyFiles):
 
     study: TrunkLoads
     rebuilt: bool
+    tasked: bool
+    lifts: Mapping[str, tuple[str, ...]]
 
     @classmethod
     def of(cls, study: TrunkLoads, cohort: Cohort) -> "TrunkFiles":
         """The files of a study of a cohort."""
-        return cls(study, cohort.specimen_names, reproduces(cohort.name) and beside())
+        names, trials = cohort.specimen_names, cohort.further.get("trials")
+        known = (
+            set() if trials is None else set(zip(trials["specimen"], trials["trial"], strict=True))
+        )
+        lifts = {
+            name: tuple(trial for trial in study.motions.trials if (name, trial) in known)
+            for name in names
+        }
+        shown = reproduces(cohort.name) and beside()
+        return cls(study, names, shown, "tasks" in cohort.further, lifts)
 
     @property
     def tables(self) -> tuple[str, ...]:
@@ -108,7 +133,9 @@ class TrunkFiles(StudyFiles):
         tuned = TUNED if self.study.volunteer else ()
         samples = ("design", "responses", *_SPREAD.writes) if self.study.uncertain.tasks else ()
         against = _AGAINST.writes if self.rebuilt else ()
-        return (*PER_PERSON, "simplified", *tuned, *samples, *against)
+        whole = (*PER_PERSON, "simplified", *tuned, *samples, *against)
+        lifts = PER_LIFT if any(self.lifts.values()) else ()
+        return (*(name for name in whole if self.tasked or name not in OF_TASKS), *lifts)
 
     @property
     def made_of_jobs(self) -> tuple[str, ...]:
@@ -117,10 +144,13 @@ class TrunkFiles(StudyFiles):
 
     def job_of(self, table: str, path: str) -> str:
         """The job that writes a file of which a table is made."""
-        return {"simplified": "simplify", "responses": "respond"}.get(table, "hold")
+        jobs = {"simplified": "simplify", "responses": "respond", **dict.fromkeys(PER_LIFT, "lift")}
+        return jobs.get(table, "hold")
 
     def blocks(self, table: str) -> list[tuple[str, str]]:
         """One block per person, of samples as many as it takes."""
+        if table in PER_LIFT:
+            return numbered_blocks([name for name, trials in self.lifts.items() if trials], 1)
         if table != "responses":
             return numbered_blocks(self.specimens, 1)
         sampled = sampled_specimens(self.study, self.specimens)
@@ -129,6 +159,8 @@ class TrunkFiles(StudyFiles):
     def job_files(self, table: str, specimen: str, block: str) -> list[str]:
         """The job files of which a block is made."""
         place = f"{self.folder}/jobs/{table}/specimen-{specimen}"
+        if table in PER_LIFT:
+            return [f"{place}/trial-{trial}.parquet" for trial in self.lifts[specimen]]
         if table == "responses":
             sampled = sampled_specimens(self.study, self.specimens)
             numbers = files_of_block(block, len(sampled), batches(self.study))
@@ -146,7 +178,12 @@ def _source_and_design(expected: Any, place: Mapping[str, str]) -> list[str]:
     return [*_source(expected, place), expected.of_job("draw", {})]
 
 
-_NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks")
+def _source_and_motion(expected: Any, place: Mapping[str, str]) -> list[str]:
+    """The marks of the trunk's source and of the person's recordings."""
+    return [*_source(expected, place), *motion_digests(expected.cohort, place["specimen"])]
+
+
+_NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks", "motions")
 
 KIND = Kind(
     question="Loads in daily tasks",
@@ -159,26 +196,36 @@ KIND = Kind(
         Job("hold", ignores=_NO_TASK_OF_ITS_OWN, also=_source),
         Job(
             "simplify",
-            ignores=ignoring("uncertain", "volunteer", "drawn_tasks"),
+            ignores=ignoring("uncertain", "volunteer", "drawn_tasks", "motions"),
             also=_source,
         ),
         Job(
             "tune",
             makes=TUNED,
-            ignores=ignoring("uncertain", "drawn_tasks", "simplified_tasks"),
+            ignores=ignoring("uncertain", "drawn_tasks", "simplified_tasks", "motions"),
             also=_source,
         ),
         Job("draw", "draw_design", makes=("design",), header_alone=True),
         Job(
             "respond",
             in_blocks="responses",
-            ignores=ignoring("volunteer", "drawn_tasks", "simplified_tasks"),
+            ignores=ignoring("volunteer", "drawn_tasks", "simplified_tasks", "motions"),
             also=_source_and_design,
+        ),
+        Job(
+            "lift",
+            "lifts",
+            ignores=ignoring(
+                *("volunteer", "drawn_tasks", "simplified_tasks", "trunk_angle"),
+                motions={"trials"},
+                uncertain={"tasks", "specimens", "samples", "samples_per_target"},
+            ),
+            also=_source_and_motion,
         ),
         _SPREAD,
         _AGAINST,
     ),
-    forms=(SUBJECTS, TASKS, *GEOMETRY_FORMS),
+    forms=(SUBJECTS, TASKS, *RECORDED, *GEOMETRY_FORMS),
     doubts="checks:doubts",
     why_no_export="a task is solved for muscle forces in a given posture, and muscles are not "
     "written: the source package of the trunk is the model to take elsewhere",

@@ -9,7 +9,10 @@ from spinepipe.report.page.study_page import Page, ResultTables
 from spinepipe.report.page.tables import Sortable, page_tables
 from spinepipe.schema import Table
 from spinepipe.studies.trunk_loads.conclusions import conclusions
+from spinepipe.studies.trunk_loads.conclusions_of_lifts import of_lifts
+from spinepipe.studies.trunk_loads.lift_rows import lifts_of
 from spinepipe.studies.trunk_loads.scenes import trunk_scenes
+from spinepipe.studies.trunk_loads.scenes_of_lifts import lift_scenes
 from spinepipe.studies.trunk_loads.selection import of_person, shown_person, sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads, reproduces
 from spinepipe.studies.trunk_loads.tables import (
@@ -27,7 +30,7 @@ SHOWN: Mapping[Table, tuple[str, str]] = {
     TASKS: (
         "Loads by body and task",
         "specimen task l4l5_compression_n l4l5_pressure_mpa l4l5_shear_n l5s1_compression_n "
-        "l5s1_shear_n strength_used inside_eq_6 stable status message",
+        "l5s1_shear_n least_stress_mpa strength_used inside_eq_6 stable status message",
     ),
     PRESSURES: (
         "Computed and measured pressures",
@@ -39,7 +42,7 @@ SHOWN: Mapping[Table, tuple[str, str]] = {
     ),
     INTERVALS: (
         "Intervals of loads",
-        "specimen task quantity nominal low median high n_samples n_failed",
+        "specimen task quantity nominal low median high n_samples n_above n_failed",
     ),
     DRIVERS: (
         "Shares of the spread by input",
@@ -59,6 +62,7 @@ SHOWN: Mapping[Table, tuple[str, str]] = {
 
 READ = (
     *(table.name for table in SHOWN),
+    *("lift_loads", "lift_frames", "lift_bands", "lift_paths"),
     *("muscles", "upright", "design", "responses", "paths", "against_ghezelbash_2016"),
 )
 """Tables whose rows the page needs; of the others it tells where they come from."""
@@ -66,16 +70,21 @@ READ = (
 
 def page(study: TrunkLoads, cohort: Cohort, results: ResultTables) -> Page:
     """What the page says and shows."""
+    lifts = bool(lifts_of(results.tables))
+    tasked = not lifts or "tasks" in cohort.further
+    told = list(conclusions(study, cohort, results)) if tasked else []
+    scenes = trunk_scenes(cohort, results.table("paths"), results.table("levels"))
     return Page(
-        conclusions=list(conclusions(study, cohort, results)),
+        conclusions=[*told, *of_lifts(study, cohort, results.tables, alone=not tasked)],
         sentences=sentences_of(__package__),
-        key_figure="pressure_against_measured",
+        key_figure="pressure_against_measured" if tasked else "lift_loads",
         tables=list(_tables(study, results)),
         left_out=(
             *left_out(study),
             *papers.left_out("Ghezelbash et al. 2016", reproduces(cohort.name)),
         ),
-        scenes=trunk_scenes(cohort, results.table("paths"), results.table("levels")),
+        scenes=[*scenes, *lift_scenes(results.tables)],
+        chooser="Specimen" if tasked else "Lift",
     )
 
 

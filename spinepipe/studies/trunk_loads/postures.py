@@ -144,7 +144,7 @@ def task_of(row: Row, means: TrunkAngle) -> Task:
 
 def read_tasks(cohort: Cohort, means: TrunkAngle) -> dict[str, Task]:
     """The tasks of a cohort by name, in the order of its file."""
-    rows = cohort.further["tasks"].to_dict("records")
+    rows = cohort.further["tasks"].to_dict("records") if "tasks" in cohort.further else []
     return {str(row["task"]): task_of(row, means) for row in rows}
 
 

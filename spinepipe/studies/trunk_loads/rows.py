@@ -10,8 +10,9 @@ from spinepipe.anatomy.segments import MASS_PERCENT
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.disc_pressure import DiscPressure, disc_pressure
 from spinepipe.muscles.masses import ARM
-from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions, solve_task
+from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions
 from spinepipe.muscles.person import Person
+from spinepipe.muscles.strength import HeldTask, hold_task
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import LEVELS
 from spinepipe.status import Balanced
@@ -35,6 +36,7 @@ class TaskOutcome:
     solved : None where it could not be posed; `message` says why.
     tone : least activation of every muscle. stable : None where not asked for.
     factor : how many times the loads could be as large. capacity : (7,) N m left.
+    held : at what muscle stress, and what a task lacks that is not held.
     """
 
     person: Person
@@ -45,6 +47,7 @@ class TaskOutcome:
     stable: bool | None = None
     factor: float | None = None
     capacity: Array | None = None
+    held: HeldTask | None = None
 
     @property
     def status(self) -> Balanced:
@@ -64,15 +67,15 @@ class TaskOutcome:
 def outcome_of(person: Person, task: Task, options: SolverOptions) -> TaskOutcome:
     """What becomes of a task; a load that the arms do not reach is an outcome as well."""
     try:
-        found = solve_task(person, task, options)
+        held = hold_task(person, task, options, least="untold")
     except ValueError as why:
         return TaskOutcome(person, task, None, str(why))
-    return TaskOutcome(person, task, found, found.message)
+    return TaskOutcome(person, task, held.solved, held.solved.message, held=held)
 
 
 def task_row(outcome: TaskOutcome) -> Row:
     """The row of table tasks."""
-    person, task, solved = outcome.person, outcome.task, outcome.solved
+    person, task, solved, held = outcome.person, outcome.task, outcome.solved, outcome.held
     # counted from upright, as tasks are told
     turned = DEG_PER_RAD * (task.turned - (0.0 if task.from_upright else person.upright))
     subject = person.subject
@@ -93,6 +96,9 @@ def task_row(outcome: TaskOutcome) -> Row:
         "status": outcome.status.value,
         "message": outcome.message,
     }
+    if held is not None:
+        least = None if held.least_pa is None else _MPA * held.least_pa
+        row |= {"least_stress_mpa": least, "short_of": held.short_of, "short_at": held.short_at}
     pressure = outcome.pressure
     if solved is None or pressure is None:
         return row

@@ -33,11 +33,11 @@ def spread_of(tables: Tables, row: Row, quantity: str) -> Row:
 
 
 def with_interval(tables: Tables, row: Row, quantity: str, unit: str) -> Value:
-    """A result of a task with the middle 95 % of its samples where these are known."""
+    """A result of a task with the middle 95 % of its samples where known; an end may be open."""
     number, spread = float(row[quantity]), spread_of(tables, row, quantity)
-    if not spread or pd.isna(spread["low"]) or pd.isna(spread["high"]):
+    if not spread or pd.isna(spread["low"]):
         return Value(number, unit, source=f"tasks: {quantity}")
-    ends = (float(spread["low"]), float(spread["high"]))
+    ends = (float(spread["low"]), None if pd.isna(spread["high"]) else float(spread["high"]))
     n = int(spread["n_samples"])
     return Value(number, unit, *ends, n, f"tasks and intervals: {quantity}")
 
@@ -69,23 +69,6 @@ def lost_and_all(rows: pd.DataFrame) -> tuple[int, int]:
     each = rows.drop_duplicates(["specimen", "task"])
     lost = int(each["n_failed"].sum())
     return lost, lost + int(each["n_samples"].sum())
-
-
-def carried_by_lost(tables: Tables, quantities: tuple[str, ...]) -> tuple[float, Row] | None:
-    """How much more lost samples carry than held ones, where that is most: a share of the median.
-
-    With the row's specimen, task and quantity; None where too few were lost to tell.
-    """
-    rows = tables.get("responses", pd.DataFrame())
-    found = []
-    for (specimen, task), own in rows.groupby(["specimen", "task"]) if len(rows) else ():
-        held = sound(own)
-        for quantity in quantities:
-            lost, good = (own[quantity][which].dropna().astype(float) for which in (~held, held))
-            if min(len(lost), len(good)) >= LEAST_SAMPLES and good.median() > 0.0:
-                place = {"specimen": specimen, "task": task, "quantity": quantity}
-                found.append((float(lost.median() / good.median() - 1.0), place))
-    return max(found, key=lambda one: abs(one[0]), default=None)
 
 
 def shares(study: TrunkLoads, tables: Tables, row: Row, quantity: str) -> tuple[pd.DataFrame, str]:

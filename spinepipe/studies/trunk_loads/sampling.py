@@ -21,11 +21,16 @@ def design_of(settings: TrunkLoads) -> Design:
 
 def values_of_design(settings: TrunkLoads) -> Array:
     """(n, D) values of the inputs: what is added, or the factor."""
+    return values_at(settings, design_of(settings))
+
+
+def values_at(settings: TrunkLoads, design: Design) -> Array:
+    """The same at the points of another design of the same inputs."""
     spreads = [
         Normal(NOMINAL[name], one.sd, -np.inf if FACTOR_UNITS[name] else SMALLEST_FACTOR)
         for name, one in settings.uncertain.factors.items()
     ]
-    return values_of(design_of(settings), spreads)
+    return values_of(design, spreads)
 
 
 def batches(settings: TrunkLoads) -> int:

@@ -67,7 +67,7 @@ def _scene(
     # tasks whose muscles are stored come first, and the first of them shapes the vertebrae
     drawn = [str(task) for task in dict.fromkeys(paths["task"]) if task in tasks]
     order = [*drawn, *(task for task in tasks if task not in drawn)]
-    start = _poses(tasks[order[0]][1])
+    start = poses_between(tasks[order[0]][1])
     axes = posed_axes(start)
     joints = [
         Endplate(centre, posed_axes(0.5 * (start[k : k + 1] + start[k + 1 : k + 2]))[0])
@@ -80,8 +80,8 @@ def _scene(
     steps = []
     for task in order:
         rows, centres = tasks[task]
-        poses = _poses(centres)
-        muscles = _muscles(paths[paths["task"] == task], top_mpa)
+        poses = poses_between(centres)
+        muscles = muscle_lines(paths[paths["task"] == task], top_mpa)
         disc = np.clip(rows["compression_n"].to_numpy(float) / top_n, 0.0, 1.0)
         told = asked[asked["task"] == task] if len(asked) else asked
         loads, says = _hands(told, poses[-1], len(bodies) - 1)
@@ -93,7 +93,7 @@ def _scene(
     return Scene(person, "Task", bodies, steps, caption, one_scale=False)
 
 
-def _poses(centres: Array) -> Array:
+def poses_between(centres: Array) -> Array:
     """(J + 1, 6) poses, mm and deg, of vertebrae between joints (J, 3) mm.
 
     A vertebra's frame is at the joint below it, its y axis points to the joint above; it is turned
@@ -110,7 +110,7 @@ def _poses(centres: Array) -> Array:
     return np.column_stack([np.vstack([centres[:1], centres]), turns])
 
 
-def _muscles(paths: pd.DataFrame, top_mpa: float) -> list[Muscle]:
+def muscle_lines(paths: pd.DataFrame, top_mpa: float) -> list[Muscle]:
     """Fascicles of one task; ``paths``: rows of the table paths, maybe none."""
     if paths.empty:
         return []

@@ -8,7 +8,7 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.muscles.trunk import GLOBAL_EXTENSORS
-from spinepipe.status import Balanced
+from spinepipe.status import HELD
 from spinepipe.studies.trunk_loads.forms import PUSH_N, PUSH_NM
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
@@ -28,7 +28,7 @@ _TURNS = ("trunk_extension_deg", "trunk_right_bending_deg", "pelvis_extension_de
 
 def sound(rows: pd.DataFrame) -> "pd.Series[bool]":
     """Rows whose forces settled and hold the task."""
-    return rows["status"] == Balanced.CONVERGED.value
+    return rows["status"].isin(HELD)
 
 
 def shown_person(study: TrunkLoads, rows: pd.DataFrame) -> str | None:
@@ -84,7 +84,7 @@ def answer_of(
     if good.empty:
         return None
     intervals = of_person(tables.get("intervals", pd.DataFrame()), person)
-    known = intervals.dropna(subset=["low", "high"])["task"] if len(intervals) else ()
+    known = intervals.dropna(subset=["low"])["task"] if len(intervals) else ()
     rank = pd.DataFrame(
         {
             "sampled": good["task"].isin(list(known)),

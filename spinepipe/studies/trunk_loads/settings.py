@@ -159,7 +159,9 @@ class Solving(BaseModel):
         description="q of a muscle's stiffness q force / length, in the question of stability",
     )
     strength: bool = Field(
-        default=True, description="whether to find the strength left at every level"
+        default=True,
+        description="whether to find the strength left at every level, and the least stress of "
+        "tasks that less than allowed holds",
     )
 
 
@@ -205,6 +207,34 @@ class Uncertain(BaseModel):
     def runs(self) -> int:
         """Samples in all, of Sobol's design without second order."""
         return self.samples * (len(self.factors) + 2)
+
+
+class Motions(BaseModel):
+    """Recorded lifts, frame by frame."""
+
+    model_config = FORM
+
+    trials: EachOnce[str] = Field(
+        default=(), description="recorded trials whose frames are tasks, of everyone who has them"
+    )
+    every: int = Field(default=1, ge=1, le=1000, description="take every so manieth frame")
+    largest_stress_mpa: float = Field(
+        default=0.6,
+        gt=0,
+        le=3,
+        description="largest active stress of muscles; what it does not hold is held at the least "
+        "that does, as far as trunks have it",
+    )
+    samples: int = Field(
+        default=0,
+        ge=0,
+        le=10_000,
+        description="persons drawn for bands, by the factors of uncertain; 0: no bands. Hands are "
+        "where they were seen: their factor does not count",
+    )
+    samples_every: int = Field(
+        default=10, ge=1, le=1000, description="bands are of every so manieth frame that is taken"
+    )
 
 
 class VolunteerSettings(BaseModel):
@@ -259,6 +289,7 @@ class TrunkLoads(Study):
         default=(), description="tasks whose muscles are drawn in 3-D; none named: the first"
     )
     uncertain: Uncertain = Field(default=Uncertain(), description="samples of persons and models")
+    motions: Motions = Field(default=Motions(), description="recorded lifts, frame by frame")
     volunteer: VolunteerSettings | None = Field(
         default=None, description="the person whose pressures were measured"
     )

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
+from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity_analysis.global_indices.estimates import Settings
@@ -12,6 +13,7 @@ from spinepipe.sensitivity_analysis.global_indices.indices import indices
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.rows import Row
 from spinepipe.studies.trunk_loads.sampling import design_of
+from spinepipe.studies.trunk_loads.selection import sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import DRIVERS, INTERVALS, QUANTITIES
 from spinepipe.tables import from_rows, read_frames, write
@@ -20,7 +22,7 @@ LEAST_SAMPLES = 20
 """Below that no interval is given."""
 
 MOST_FAILED = 0.2
-"""Share of the samples above which none is given: what is left would be those that are easy."""
+"""Share of the samples above which no share is given: what is left would be those that are easy."""
 
 RESOLUTION = 1e-6
 """Outcomes that vary by less are constant."""
@@ -45,19 +47,14 @@ def run(root: str, study: str, tables: list[str], intervals: str, drivers: str) 
     write(from_rows(DRIVERS, driving), drivers, made_by)
 
 
-def sound(rows: pd.DataFrame) -> "pd.Series[bool]":
-    """Samples whose forces settled and hold the task."""
-    return rows["status"] == Balanced.CONVERGED
-
-
 def _intervals(who: str, task: str, rows: pd.DataFrame, nominal: pd.DataFrame) -> Iterator[Row]:
     good = rows[sound(rows)]
+    above = int((rows["status"] == Balanced.CONVERGED_ABOVE).sum())
     own = nominal[(nominal["specimen"] == who) & (nominal["task"] == task)].iloc[0]
     for quantity in QUANTITIES:
         values = good[quantity].to_numpy(float)
         lost = len(rows) - len(values)
-        enough = len(values) >= LEAST_SAMPLES and lost <= MOST_FAILED * len(rows)
-        ends = np.quantile(values, [0.025, 0.5, 0.975]).tolist() if enough else [None] * 3
+        ends = [censored_quantile(values, lost, p) for p in (0.025, 0.5, 0.975)]
         yield {
             "specimen": who,
             "task": task,
@@ -66,7 +63,23 @@ def _intervals(who: str, task: str, rows: pd.DataFrame, nominal: pd.DataFrame) -
             **dict(zip(("low", "median", "high"), ends, strict=True)),
             "n_samples": len(values),
             "n_failed": lost,
+            "n_above": above,
         }
+
+
+def censored_quantile(values: Array, beyond: int, p: float) -> float | None:
+    """Quantile of values and of so many of which is known that they are farther from nought.
+
+    None where it lies among those, or where values are fewer than `LEAST_SAMPLES`.
+    """
+    if len(values) < LEAST_SAMPLES:
+        return None
+    away = -1.0 if np.median(values) < 0.0 else 1.0
+    known = np.sort(values)
+    at = p * (len(values) + beyond - 1) - (beyond if away < 0.0 else 0)
+    if not 0.0 <= at <= len(values) - 1:
+        return None
+    return float(np.interp(at, np.arange(len(values)), known))
 
 
 def _drivers(settings: TrunkLoads, who: str, task: str, rows: pd.DataFrame) -> Iterator[Row]:

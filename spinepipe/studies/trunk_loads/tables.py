@@ -19,6 +19,10 @@ DESIGN = declared(__file__, "design")
 RESPONSES = declared(__file__, "responses")
 INTERVALS = declared(__file__, "intervals")
 DRIVERS = declared(__file__, "drivers")
+LIFT_LOADS = declared(__file__, "lift_loads")
+LIFT_FRAMES = declared(__file__, "lift_frames")
+LIFT_BANDS = declared(__file__, "lift_bands")
+LIFT_PATHS = declared(__file__, "lift_paths")
 AGAINST_GHEZELBASH_2016 = declared(__file__, "against_ghezelbash_2016")
 
 SIMPLIFICATIONS = SIMPLIFIED.column("simplification").allowed

@@ -21,7 +21,7 @@ from spinepipe.muscles.measured_pressures import PairedPressure, pair_with_tasks
 from spinepipe.muscles.task import Task
 from spinepipe.muscles.trunk import Trunk
 from spinepipe.progress import Progress
-from spinepipe.status import Balanced
+from spinepipe.status import HELD
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.trunk_loads.persons import (
     UprightPerson,
@@ -119,7 +119,7 @@ class Volunteer:
         off = []
         for one in wanted:
             (mpa, ended), (_, usually) = found[one.task], usual[one.task]
-            if mpa is None or ended != usually == Balanced.CONVERGED:
+            if mpa is None or (usually in HELD and ended not in HELD):
                 return None
             off.append(mpa - one.mpa)
         return np.array(off)
@@ -316,7 +316,7 @@ def agreement(tier: str, pressures: Sequence[Row]) -> Row:
     measured = np.array([row["measured_mpa"] for row in rows])
     computed = np.array([row["computed_mpa"] for row in rows])
     off, n = computed - measured, len(rows)
-    not_held = sum(row["status"] != Balanced.CONVERGED for row in rows)
+    not_held = sum(row["status"] not in HELD for row in rows)
     r = float(np.corrcoef(measured, computed)[0, 1]) if n >= LEAST_FOR_R else None
     low = high = None
     if r is not None and n >= LEAST_FOR_INTERVAL and abs(r) < 1.0:

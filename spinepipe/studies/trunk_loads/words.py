@@ -13,6 +13,14 @@ ENDED = {
 }
 """How tasks ended that the model does not hold."""
 
+REFUSED = {
+    "weak": "{} take more",
+    "arms": "{} ask for what lever arms make at no stress",
+    "reach": "{} cannot be reached",
+    "unsolved": "{} did not converge",
+}
+"""Why pairs of body and task are refused, by count."""
+
 INPUTS = {
     "height_cm": "body height",
     "bmi": "body mass index",
@@ -29,6 +37,15 @@ INPUTS = {
     "largest_stress_mpa": "muscle strength",
 }
 """Uncertain inputs, three words at most."""
+
+STANDING = {
+    "held": "is not held",
+    "strong": "takes {share:unit} of the strength",
+    "toned": "needs {tone:unit} muscle tone to be stable",
+    "falls": "is not stable at any muscle tone",
+    "unsought": "is not stable without muscle tone",
+}
+"""What relaxed standing lacks."""
 
 SIMPLIFIED = {
     "no_feedback": "leaving the spine undeformed",

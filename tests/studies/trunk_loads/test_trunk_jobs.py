@@ -63,6 +63,27 @@ def test_every_task_has_its_rows_and_every_kilogram_its_place() -> None:
     assert {row["task"] for row in rows["paths"]} == {FEW[0]}
 
 
+def test_rows_tell_the_stress_that_a_task_takes_and_why_it_is_not_held() -> None:
+    whole = volunteers()
+    asked = whole.further["tasks"]
+    chosen = asked[asked["task"].isin(["standing", "load_close", "exertion_extension"])]
+    weaker = chosen.assign(largest_stress_mpa=[0.6, 0.3, 1.0], tone=pd.NA)
+    cohort = replace(whole, further={**whole.further, "tasks": weaker.reset_index(drop=True)})
+    rows = {
+        row["task"]: row for row in hold.rows_of(ASKED, cohort, "volunteer", Progress())["tasks"]
+    }
+    standing, above, beyond = (rows[name] for name in chosen["task"])
+    assert standing["status"] == Balanced.CONVERGED
+    assert 0.0 < standing["least_stress_mpa"] < 0.6
+    assert above["status"] == Balanced.CONVERGED_ABOVE
+    assert 0.3 == above["largest_stress_mpa"] < above["least_stress_mpa"] <= 1.3
+    assert above["highest_stress_mpa"] == pytest.approx(above["least_stress_mpa"], rel=0.03)
+    assert above["strength_used"] > 1.0, "of the strength at the stress asked for"
+    assert (beyond["status"], beyond["short_of"]) == (Balanced.BEYOND_STRENGTH, "strength")
+    assert beyond["least_stress_mpa"] > 1.3
+    assert beyond["short_at"] in beyond["message"]
+
+
 def test_what_is_out_of_reach_is_a_row_with_a_reason() -> None:
     row = task_of("woman", "flexion_70_with_load")
     assert row["status"] not in ("", Balanced.CONVERGED)
@@ -173,25 +194,37 @@ def test_shares_of_what_drives_an_answer() -> None:
     assert total.drop(list(weights)).abs().max() < 1e-9
 
 
-def test_intervals_count_what_failed_and_need_enough_samples() -> None:
+def test_samples_that_no_forces_hold_count_beyond_the_upper_end() -> None:
     rows = additive({"bmi": 1.0})
-    rows.loc[rows.index[:40], "status"] = Balanced.BEYOND_STRENGTH.value
-    many = rows.copy()
-    many.loc[many.index[: len(many) // 2], "status"] = Balanced.BEYOND_STRENGTH.value
+    one = rows[rows["task"] == "standing"].sort_values(QUANTITIES[0])
+    known = np.sort(one[QUANTITIES[0]].to_numpy(float))
     nominal = pd.DataFrame([task_of("volunteer", "standing")])
-    one = rows[rows["task"] == "standing"]
-    (first, *_) = list(spread._intervals("volunteer", "standing", one, nominal))
-    assert first["n_failed"] == 20
-    assert first["n_samples"] == len(one) - 20
-    assert first["low"] == pytest.approx(10.0 - 1.96, abs=0.3)
-    assert first["high"] == pytest.approx(10.0 + 1.96, abs=0.3)
-    half = many[many["task"] == "standing"]
-    (lost, *_) = list(spread._intervals("volunteer", "standing", half, nominal))
-    assert lost["n_samples"] > spread.LEAST_SAMPLES
-    assert lost["low"] is None
-    (few_left, *_) = list(spread._intervals("volunteer", "standing", one.head(30), nominal))
-    assert few_left["n_samples"] < spread.LEAST_SAMPLES
-    assert few_left["low"] is None
+
+    def interval(lost: int, above: int = 0, sign: float = 1.0) -> dict[str, Any]:
+        """The highest so many do not hold, and so many below them take more stress."""
+        own = one.assign(**{QUANTITIES[0]: sign * one[QUANTITIES[0]]})
+        n = len(own)
+        status = own["status"].to_numpy(object).copy()
+        status[n - lost - above : n - lost] = Balanced.CONVERGED_ABOVE.value
+        status[n - lost :] = Balanced.BEYOND_STRENGTH.value
+        own = own.assign(status=status)
+        return next(iter(spread._intervals("volunteer", "standing", own, nominal)))
+
+    n, ends = len(known), np.quantile(known, [0.025, 0.5, 0.975]).tolist()
+    for lost, above in ((0, 0), (0, 40), (n // 50, 10)):
+        found = interval(lost, above)
+        assert [found[end] for end in ("low", "median", "high")] == pytest.approx(ends)
+        assert (found["n_samples"], found["n_failed"]) == (n - lost, lost)
+        assert found["n_above"] == above
+    tenth = interval(n // 10)
+    assert [tenth["low"], tenth["median"]] == pytest.approx(ends[:2]), "as if they were known"
+    assert tenth["high"] is None
+    backwards = interval(n // 10, sign=-1.0)
+    assert [backwards["median"], backwards["high"]] == pytest.approx([-ends[1], -ends[0]])
+    assert backwards["low"] is None, "a shear backwards fails at its lower end"
+    most = interval(n - 30)
+    assert (most["median"], most["high"]) == (None, None)
+    assert interval(n - 10)["low"] is None, "too few are left to tell"
 
 
 def test_the_generic_male_holds_tasks_1_to_9() -> None:
