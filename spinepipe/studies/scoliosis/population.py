@@ -244,4 +244,4 @@ def population_of(rows: pd.DataFrame) -> tuple[Population, FilmSd]:
         for name in ("", "frame_")
     )
     means = np.concatenate(parts)
-    return Population(means, *spreads[:2], np.concatenate(unsure)), FilmSd(*sd)
+    return Population(means, spreads[0], spreads[1], np.concatenate(unsure)), FilmSd(*sd)
