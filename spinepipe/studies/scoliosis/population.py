@@ -229,8 +229,14 @@ def population_rows(
 
 
 def population_of(rows: pd.DataFrame) -> tuple[Population, FilmSd]:
-    """The population of a table's rows, and the SD with which films were weighed."""
+    """The population of a table's rows, and the SD with which films were weighed.
+
+    Earlier versions took means as known and frames as exact: what they did not write is nought.
+    """
     parts, spreads, unsure = [], [], []
+    earlier = ("mean_sd_log", "frame_place_sd_mm", "frame_tilt_sd_deg")
+    rows = rows.reindex(columns=[*rows.columns, *(one for one in earlier if one not in rows)])
+    rows = rows.fillna(dict.fromkeys(earlier, 0.0))
     for quantity in PER_SEGMENT:
         chosen = rows[rows["quantity"] == quantity]
         unit = 1.0 if quantity == "ratio" else DEG_PER_RAD

@@ -344,3 +344,17 @@ def test_patients_of_whom_nothing_is_known_change_no_spread() -> None:
     after = update_population(before, [unknown] * 50)
     np.testing.assert_allclose(after.mean, before.mean, atol=1e-12)
     np.testing.assert_allclose([after.ratio_sd, after.end_sd], [0.40, 0.35], rtol=1e-9)
+
+
+def test_a_population_of_an_earlier_version_is_read_as_known_with_exact_frames() -> None:
+    """Without the columns that came later, and with them empty."""
+    found = PopulationEstimate(replace(usual_population(2), unsure=np.ones(6)), 1, 0.0, 1, (), True)
+    rows = list(population_rows(found, ("a", "b"), film_sd(1.0, 1.0, 1.0, 1.0)))
+    now = from_rows(POPULATION, rows).to_pandas()
+    later = ["mean_sd_log", "frame_place_sd_mm", "frame_tilt_sd_deg"]
+    for earlier in (now.drop(columns=later), now.assign(**dict.fromkeys(later, np.nan))):
+        population, sd = population_of(earlier)
+        np.testing.assert_array_equal(population.unsure, 0.0)
+        np.testing.assert_array_equal(sd.frame, 0.0)
+        np.testing.assert_allclose(sd.vertebra, film_sd(1.0, 1.0, 1.0, 1.0).vertebra)
+        np.testing.assert_allclose(population.mean, usual_population(2).mean)
