@@ -34,9 +34,10 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 
 def by_range_rows(displacements: pd.DataFrame) -> Iterator[dict[str, Any]]:
     """Rows by group of films, whether segments turn against a bend, class and model."""
-    errors = displacements.assign(
-        square=of_rotations(displacements) ** 2,
-        range=classes(displacements["share_of_range"].to_numpy(float)),
+    read = displacements.dropna(subset=["measured_deg"])
+    errors = read.assign(
+        square=of_rotations(read) ** 2,
+        range=classes(read["share_of_range"].to_numpy(float)),
     )
     models = list(displacements["model"].unique())
     for group in GROUPS:

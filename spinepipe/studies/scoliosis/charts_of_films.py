@@ -40,7 +40,8 @@ def film_overlay(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
     spine = median_spine(positions)
     if spine is None:
         return saying(title, "No law has a pose on any film.")
-    films = read_films(cohort, spine).films
+    read = read_films(cohort, spine)
+    films = read.films
     there = [name for name in films if name != ERECT]
     usual = [name for name in (*HELD_OUT, RIGHT, LEFT) if name in there]
     shown = [*usual, *(name for name in there if name not in usual)][:MOST_POSITIONS]
@@ -52,7 +53,8 @@ def film_overlay(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart:
         for law in LOOKS:
             row = own[(own["position"] == position) & (own["model"] == law)]
             if len(row):
-                off, up = np.append(0.0, row["off_right_mm"]), MM_PER_M * films[position].up
+                off = np.append(0.0, row["off_right_mm"])
+                up = MM_PER_M * films[position].up[np.append(True, read.compared(position)[1:])]
                 lines.append(pd.DataFrame({"x": off, "y": up, "series": law}))
         if not lines:
             continue
@@ -99,7 +101,7 @@ def load_displacement(study: Scoliosis, cohort: Cohort, tables: Tables) -> Chart
         for _, row in own[own["joint"] == joint].iterrows():
             r, moment = curve(row, reach)
             parts.append(pd.DataFrame({"x": r, "y": moment, "series": str(row["model"])}))
-        film = on_films.loc[on_films["joint"] == joint, "measured_deg"].to_numpy(float)
+        film = on_films.loc[on_films["joint"] == joint, "measured_deg"].dropna().to_numpy(float)
         parts.append(pd.DataFrame({"x": film, "y": 0.0, "series": "films"}))
         panels.append(
             Curves(

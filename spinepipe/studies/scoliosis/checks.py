@@ -1,6 +1,6 @@
 """What a study of scoliotic spines demands of its films: each fault with its place and remedy."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,19 +14,26 @@ from spinepipe.studies.scoliosis.films import (
     CENTRE,
     CORNERS,
     ERECT,
+    FEWEST_READ,
     HELD_OUT,
     LEFT,
     NEEDED,
     PATIENTS,
     RIGHT,
     Film,
+    Flags,
     by_reading,
     film_readings,
+    read_on,
+    read_rows,
     run_around,
     uncrossed,
 )
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
+
+FEWEST = 2
+"""Vertebrae that have a line between them."""
 
 FARTHEST_APART_DEG = 25.0
 """Tilt of a vertebra and of the line through its neighbours' centres differ by less."""
@@ -57,6 +64,7 @@ def check_scoliosis(
     for patient in cohort.specimen_names:
         rows = films[films["specimen"] == patient]
         file = f"{cohort.name}/films.csv"
+        seen = read_on(rows, cohort.vertebrae)
         shapes: dict[str, Film] = {}
         for position in dict.fromkeys(rows["position"]):
             film = rows[rows["position"] == position]
@@ -65,13 +73,41 @@ def check_scoliosis(
             around = run_around(rows)  # which `plausibility` tells
             faults += [] if around else _corners(place, film)
             yield from faults
-            if not faults and not around:
-                shapes[position] = Film(*film_readings(film, cohort.vertebrae).mean(axis=0))
-                yield from _tilts(place, film, cohort.vertebrae, shapes[position])
-        # then what films of one patient say of each other
-        yield from _bends(file, patient, shapes)
+            if not faults and not around and seen[position].sum() >= FEWEST:
+                names = tuple(np.array(cohort.vertebrae)[seen[position]])
+                shapes[position] = Film(*film_readings(read_rows(film), names).mean(axis=0))
+                yield from _tilts(place, film, names, shapes[position])
+        yield from _too_few(cohort, file, patient, seen)
         if ERECT in shapes:
             yield from _cobb(cohort, patient, shapes[ERECT])
+        # then what films of one patient say of each other, by the vertebrae that all of them have
+        shared = np.all([seen[name] for name in shapes] or [[False]], axis=0)
+        if shared.sum() >= FEWEST:
+            alike = {
+                name: Film(*film.rows[:, shared[seen[name]]]).seen_from_below()
+                for name, film in shapes.items()
+            }
+            yield from _bends(file, patient, alike)
+
+
+def _too_few(
+    cohort: Cohort, file: str, patient: str, seen: Mapping[str, Flags]
+) -> Iterator[InputProblem]:
+    """Is there a spine that the erect and both bending films show?"""
+    if not set(NEEDED) <= set(seen):  # which the form tells
+        return
+    shared = np.all([seen[name] for name in NEEDED], axis=0)
+    fewest = min(FEWEST_READ, len(cohort.vertebrae))
+    if shared.sum() < fewest:
+        position = min(NEEDED, key=lambda name: int(seen[name].sum()))
+        has = f"{shared.sum()} vertebrae read on all of {', '.join(NEEDED)}"
+        yield _FilmPlace(file, patient, position).problem(
+            None,
+            "vertebra",
+            f"{has}, {seen[position].sum()} on this one",
+            f"at least {fewest} that all of these films have",
+            "read more vertebrae, or leave the patient out",
+        )
 
 
 @dataclass(frozen=True)
@@ -106,30 +142,22 @@ def _cobb(cohort: Cohort, patient: str, erect: Film) -> Iterator[InputProblem]:
 
 
 def _film(cohort: Cohort, place: _FilmPlace, rows: pd.DataFrame) -> Iterator[InputProblem]:
-    """Each reading of a film: every vertebra once, all of its numbers, the lowest at nought."""
+    """Each reading of a film: a vertebra once, the lowest at nought."""
     for reading in by_reading(rows):
         known = reading[["observer", "repeat"]].iloc[0].dropna()
         who = ", ".join(f"{name} {value}" for name, value in known.items())
         by = f" ({who})" if who else ""
         line = int(reading.index[0])
         there = list(reading["vertebra"])
-        missing = [name for name in cohort.vertebrae if name not in there]
-        if missing:
-            found = f"no {', '.join(missing)}{by}"
-            yield place.problem(
-                line, "vertebra", found, "every vertebra of cohort.yaml", "add the rows"
-            )
         twice = [name for name in dict.fromkeys(there) if there.count(name) > 1]
         if twice:
             found = f"{', '.join(twice)} twice{by}"
             remedy = "delete one film, or number them as repeats"
             yield place.problem(line, "vertebra", found, "a position once", remedy)
-        if missing or twice:
-            continue
-        whole = reading[list(CORNERS)].notna().all(axis=1)
-        centre = reading[list(CENTRE)].notna().all(axis=1)
-        if centre.all() and not whole.all():
-            yield from _lowest(cohort, place, reading)
+        read = read_rows(reading)
+        by_corners = read[list(CORNERS)].notna().all(axis=None)
+        if not twice and not by_corners and cohort.vertebrae[0] in set(read["vertebra"]):
+            yield from _lowest(cohort, place, read)
 
 
 def _corners(place: _FilmPlace, rows: pd.DataFrame) -> Iterator[InputProblem]:

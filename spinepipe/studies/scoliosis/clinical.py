@@ -35,7 +35,8 @@ def run(root: str, study: str, tables: list[str], output: str) -> None:
 def clinical_rows(cohort: Cohort) -> Iterator[dict[str, Any]]:
     """A row for each patient, film and curve of the erect film."""
     for patient in cohort.specimen_names:
-        films = read_films(cohort, patient).films
+        read = read_films(cohort, patient)
+        films, vertebrae = read.films, read.vertebrae
         erect = films[ERECT]
         for position, film in films.items():
             shifted = aside(_point(film, -1), _point(film, 0), _point(erect, -1))
@@ -45,16 +46,23 @@ def clinical_rows(cohort: Cohort) -> Iterator[dict[str, Any]]:
                 )
                 cobb, before = curve.cobb(film), curve.cobb(erect)
                 taken_off = 100.0 * (1.0 - cobb / before)
+                seen = read.compared(position)
+                ends, points = (
+                    seen[[*at]].all()
+                    for at in ((curve.lower, curve.upper), (curve.lower, curve.apex, curve.upper))
+                )
                 yield {
                     "specimen": patient,
                     "position": position,
                     "curve": number,
-                    "region": region(cohort.vertebrae[curve.apex]),
+                    "region": region(vertebrae[curve.apex]),
                     "side": "right" if curve.side > 0 else "left",
-                    "apex_vertebra": cohort.vertebrae[curve.apex],
-                    "cobb_deg": DEG_PER_RAD * cobb,
-                    "flexibility_percent": None if position == ERECT else taken_off,
-                    "apical_translation_mm": MM_PER_M * curve.side * aside(apex, low, high),
+                    "apex_vertebra": vertebrae[curve.apex],
+                    "cobb_deg": DEG_PER_RAD * cobb if ends else None,
+                    "flexibility_percent": taken_off if ends and position != ERECT else None,
+                    "apical_translation_mm": MM_PER_M * curve.side * aside(apex, low, high)
+                    if points
+                    else None,
                     "coronal_balance_mm": MM_PER_M * shifted,
                 }
 

@@ -28,6 +28,17 @@ def quality(results: ResultTables, *groups: Compared) -> Iterator[Conclusion]:
     if len(laws):
         yield from _fits(laws)
         yield from _segments(laws)
+    lacking = results.table("not_read")
+    if len(lacking):
+        made = dict(tuple(lacking.groupby("made_of_it")))
+        none = lacking[:0]
+        counts = {
+            "spines": lacking["specimen"].nunique(),
+            "between": len(made.get("interpolated", none)),
+            "shortened": made.get("spine_shortened", none)["specimen"].nunique(),
+            "films": len(made.get("film_left_out", none).groupby(["specimen", "position"])),
+        }
+        yield Conclusion("not_read", "check", numbers_from("not_read: made_of_it", **counts))
     population = results.table("population")
     if "status" in population and (population["status"] == Status.NOT_CONVERGED.value).any():
         yield Conclusion("population", "check")

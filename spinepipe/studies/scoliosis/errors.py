@@ -12,7 +12,8 @@ REFERENCE = "linear_regions"
 """The model that Jalalian 2017 compares with."""
 
 _OF_FILMS = {"place": "place_rmse_mm", "tilt": "tilt_rmse_deg"}
-"""Column of `positions`; films have equally many vertebrae, so mean squares may be averaged."""
+"""Column of `positions`; films have equally many vertebrae but for those that were not read, so
+mean squares may be averaged."""
 
 
 def of_group(rows: pd.DataFrame, group: str) -> pd.DataFrame:
@@ -23,14 +24,18 @@ def of_group(rows: pd.DataFrame, group: str) -> pd.DataFrame:
 def squares(
     measure: str, positions: pd.DataFrame, displacements: pd.DataFrame, curves: pd.DataFrame
 ) -> pd.DataFrame:
-    """Squared errors of a measure beside ``specimen`` and ``model``; NaN where there is no pose."""
+    """Squared errors of a measure beside ``specimen`` and ``model``; NaN where there is no pose.
+
+    Of what was read on the films.
+    """
     if measure == "rotation":
-        rows, error = displacements, of_rotations(displacements)
+        rows = displacements.dropna(subset=["measured_deg"])
+        error = of_rotations(rows)
     elif measure in _OF_FILMS:
         rows, error = positions, positions[_OF_FILMS[measure]]
     else:
-        rows = curves
-        error = curves[f"{measure}_simulated_deg"] - curves[f"{measure}_measured_deg"]
+        rows = curves.dropna(subset=[f"{measure}_measured_deg"])
+        error = rows[f"{measure}_simulated_deg"] - rows[f"{measure}_measured_deg"]
     return rows[["specimen", "model"]].assign(square=error.astype(float) ** 2)
 
 

@@ -33,7 +33,12 @@ from spinepipe.studies.scoliosis.films import LEFT, RIGHT, Film, FilmSd
 from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, with_laws
 from spinepipe.studies.scoliosis.optima import FilmOptimum, Limits, best, optimum
 from spinepipe.studies.scoliosis.personal import Fitting, Patient, PersonalModel
-from spinepipe.studies.scoliosis.population import PatientPrior, Population, usual_population
+from spinepipe.studies.scoliosis.population import (
+    PatientPrior,
+    Population,
+    places_among,
+    usual_population,
+)
 from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, EndRotations
 
 FARTHEST = 5.0
@@ -82,6 +87,13 @@ class FilmInformation:
         mean = covariance @ self.vector + drawn @ population.mean
         unsure = drawn * population.unsure
         return PatientPrior(mean.astype(float, copy=False), covariance + unsure @ unsure.T)
+
+    def of_all(self, lowest: int, segments: int) -> "FilmInformation":
+        """The same of all segments, of which these begin with one; nothing of the others."""
+        at = places_among(lowest, len(self.vector) // 3, segments)
+        found = FilmInformation(np.zeros((3 * segments,) * 2), np.zeros(3 * segments))
+        found.matrix[np.ix_(at, at)], found.vector[at] = self.matrix, self.vector
+        return found
 
     def decided(self, population: Population) -> float:
         """Sum over numbers of the films' share of what is known of them."""
@@ -263,7 +275,8 @@ class FilmFit:
 
         Returns
         -------
-        (6 (S - 1),) and (6 (S - 1), 3 S + 12), or None where a film has no pose.
+        (N,) and (N, 3 S + 12), of N = 6 (S - 1) where every vertebra was read, or None where a film
+        has no pose.
         """
         numbers = unknowns[:-READINGS]
         laws, laws_by = laws_of(numbers, self.size), by_numbers(numbers, self.size)
@@ -281,9 +294,10 @@ class FilmFit:
             held_by = np.zeros((len(posed.result.q), len(unknowns)))
             held_by[:, : len(numbers)] = self._held_by(posed.result.q, laws, laws_by)
             change = posed.answers_to(held_by, top_by)
-            # the lowest vertebra is fixed and the uppermost held: what lies between is compared
-            off = (posed.film.rows - read)[:, 1:-1] / self.sd.vertebra[:, None]
-            by = posed.film_by[:, :-1] @ change - read_by[:, 1:-1]
+            # the lowest vertebra is fixed and the uppermost held: what was read between is compared
+            seen = 1 + np.flatnonzero(self.patient.read.compared(position)[1:-1])
+            off = (posed.film.rows - read)[:, seen] / self.sd.vertebra[:, None]
+            by = posed.film_by[:, seen - 1] @ change - read_by[:, seen]
             errors.append(off.ravel())
             slopes.append((by / self.sd.vertebra[:, None, None]).reshape(off.size, -1))
         residuals, by_errors = counted(np.concatenate(errors))

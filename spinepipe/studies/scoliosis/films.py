@@ -3,6 +3,9 @@
 In files the axes are those of Jalalian 2017: y to the left, z along the lowest vertebra, rotation
 to the right negative. Here: to the right, up, tilt to the right; m and rad. Each film is seen from
 its own lowest vertebra, which then lies at nought and stands upright.
+
+A vertebra that was not read on a film is put where its neighbours have it, and compared with
+nothing. One that lacks at an end of the erect or a bending film shortens the patient's spine.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import memoize_per_cohort
@@ -27,6 +32,11 @@ HELD_OUT = ("neutral", "traction")
 READINGS_OF_A_CHANGE = 2
 """On the film and on the erect one. Those of the erect one are in both bending films; here they are
 two, so that the films are trusted less in what they differ by."""
+
+FEWEST_READ = 3
+"""Vertebrae that a film has at least: between the two that are given one is compared."""
+
+Flags = NDArray[np.bool_]
 
 CENTRE = ("y_mm", "z_mm", "orientation_deg")
 CORNERS = tuple(
@@ -94,6 +104,9 @@ class PatientFilms:
     readings : by position, how many were averaged.
     own_sd : m, SD of a vertebra's own place, whatever the frame of the reading.
     traction : by position, N; NaN without.
+    vertebrae : names of the patient's, caudal to cranial. lowest : number of the first of them in
+        the cohort.
+    seen : by position, (V,) whether a vertebra was read; all, where it is not told.
     """
 
     films: Mapping[str, Film]
@@ -102,6 +115,21 @@ class PatientFilms:
     readings: Mapping[str, int]
     own_sd: float = np.nan
     traction: Mapping[str, float] = field(default_factory=dict)
+    vertebrae: tuple[str, ...] = ()
+    lowest: int = 0
+    seen: Mapping[str, Flags] = field(default_factory=dict)
+
+    def compared(self, position: str) -> Flags:
+        """(V,) vertebrae that were read on this film and on the erect one."""
+        every = np.ones(len(self.films[position].up), dtype=bool)
+        found: Flags = self.seen.get(position, every) & self.seen.get(ERECT, every)
+        return found
+
+    def compared_turns(self, position: str) -> Flags:
+        """(V - 1,) segments between two such vertebrae."""
+        read = self.compared(position)
+        found: Flags = read[1:] & read[:-1]
+        return found
 
     def turned(self, position: str) -> Array:
         """(V - 1,) rad: r, how far segments have turned since the erect film, right positive."""
@@ -116,29 +144,73 @@ class PatientFilms:
 
 @memoize_per_cohort
 def read_films(cohort: Cohort, patient: str) -> PatientFilms:
-    """The films of a patient; `checks` has seen to it that they are whole."""
+    """The films of a patient; `checks` has seen to it that there is enough on them."""
     rows = cohort.further["films"]
     rows = rows[rows["specimen"] == patient]
-    every, sizes = {}, {}
-    for position, film in rows.groupby("position", sort=False):
-        every[str(position)] = film_readings(film, cohort.vertebrae)
-        size = height(film)
-        if size is not None:
-            sizes[str(position)] = size
+    seen = read_on(rows, cohort.vertebrae)
+    lowest, top = span_of(seen)
+    vertebrae = cohort.vertebrae[lowest : top + 1]
+    seen = {name: one[lowest : top + 1] for name, one in seen.items()}
+    seen = {name: one for name, one in seen.items() if can_be_held(one)}
+    read = {name: read_rows(rows[rows["position"] == name]) for name in seen}
     # corners tell how large a film is: all become as large as the erect one
-    known = ERECT in sizes
-    scales = {
-        name: sizes[ERECT] / sizes[name] if known and name in sizes else 1.0 for name in every
+    scales = {name: _scale(read[ERECT], film) for name, film in read.items()}
+    every = {
+        name: film_readings(film, tuple(np.array(vertebrae)[seen[name]]))
+        * np.array([[scales[name]] * 2 + [1.0]]).T
+        for name, film in read.items()
     }
-    every = {name: each * np.array([[scales[name]] * 2 + [1.0]]).T for name, each in every.items()}
-    films = {name: Film(*each.mean(axis=0)) for name, each in every.items()}
+    erect = filled(every[ERECT].mean(axis=0), seen[ERECT], np.zeros((3, len(vertebrae))))
+    films = {n: Film(*filled(each.mean(axis=0), seen[n], erect)) for n, each in every.items()}
     traction = {}
     if "traction_n" in rows:
-        pulls = rows.groupby("position", sort=False)["traction_n"].mean()
-        traction = {str(name): float(pull) for name, pull in pulls.items()}
+        traction = {name: float(film["traction_n"].mean()) for name, film in read.items()}
     readings = {name: len(each) for name, each in every.items()}
     repeated = list(every.values())
-    return PatientFilms(films, scales, _sd(repeated), readings, _own_sd(repeated), traction)
+    errors = _sd(repeated), readings, _own_sd(repeated)
+    return PatientFilms(films, scales, *errors, traction, vertebrae, lowest, seen)
+
+
+def read_rows(film: pd.DataFrame) -> pd.DataFrame:
+    """Rows of a film that have what most of them have, corners or else centre and tilt."""
+    corner, centre = (film[list(names)].notna().all(axis=1) for names in (CORNERS, CENTRE))
+    found: pd.DataFrame = film[corner if corner.sum() >= centre.sum() else centre]
+    return found
+
+
+def read_on(rows: pd.DataFrame, vertebrae: tuple[str, ...]) -> dict[str, Flags]:
+    """By position, (V,) whether all readings of the film have a vertebra."""
+    found = {}
+    for position, film in rows.groupby("position", sort=False):
+        each = [np.isin(vertebrae, one["vertebra"]) for one in by_reading(read_rows(film))]
+        found[str(position)] = np.all(each or [np.zeros(len(vertebrae), bool)], axis=0)
+    return found
+
+
+def span_of(seen: Mapping[str, Flags]) -> tuple[int, int]:
+    """Lowest and uppermost vertebra that are read on the erect and on both bending films."""
+    at = np.flatnonzero(np.all([seen[name] for name in NEEDED], axis=0))
+    return int(at[0]), int(at[-1])
+
+
+def can_be_held(seen: Flags) -> bool:
+    """Whether a film has the ends of the patient's spine (V,), and a vertebra between."""
+    return bool(seen[0] and seen[-1] and seen.sum() >= min(FEWEST_READ, len(seen)))
+
+
+def filled(read: Array, seen: Flags, base: Array) -> Array:
+    """(3, V): what was read (3, R), and a base (3, V) moved smoothly where nothing was."""
+    at = np.flatnonzero(seen)
+    found: Array = base + CubicSpline(at, read - base[:, at], axis=1)(np.arange(len(seen)))
+    found[:, at] = read
+    return found
+
+
+def _scale(erect: pd.DataFrame, film: pd.DataFrame) -> float:
+    """Factor of a film that makes vertebrae as high as on the erect one."""
+    both = set(erect["vertebra"]) & set(film["vertebra"])
+    sizes = [height(one[one["vertebra"].isin(both)]) for one in (erect, film)]
+    return sizes[0] / sizes[1] if sizes[0] and sizes[1] else 1.0
 
 
 def by_reading(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
@@ -265,7 +337,7 @@ def step_sd_deg(cohort: Cohort) -> float | None:
     rows = cohort.further["films"]
     if rows[list(CORNERS)].notna().any(axis=None):
         return None
-    tilts = rows["orientation_deg"].to_numpy(float)
+    tilts = rows["orientation_deg"].dropna().to_numpy(float)
     steps = (10.0**-k for k in range(4) if np.allclose(tilts, tilts.round(k), rtol=0.0, atol=1e-9))
     step = next(steps, None)
     return None if step is None else step / float(np.sqrt(12.0))

@@ -6,6 +6,8 @@ under it, as the parabolas hold near the fits alone.
 """
 
 import sys
+from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +23,7 @@ from spinepipe.studies.scoliosis.film_fit import (
     fit_alike,
 )
 from spinepipe.studies.scoliosis.films import FilmSd, film_sd, reading_noise
-from spinepipe.studies.scoliosis.personal import patient_of
+from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import (
     Population,
     PopulationEstimate,
@@ -66,22 +68,45 @@ def fit_population(
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
     population = usual_population(len(cohort.joint_names))
     rounds, change, fits = 0, np.inf, dict[str, FilmFitResult]()
+    films: list[FilmInformation] = []
     for _ in progress.through(range(1, MOST_ROUNDS + 1), "population: rounds"):
         rounds += 1
         # fits of all under the population, from the fits before or, without these, all starts
-        problems = [FilmFit(patient, sd) for patient in patients.values()]
-        found = fit_alike(problems, population, [fits.get(name) for name in patients])
-        fits = {name: one for name, one in zip(patients, found, strict=True) if one is not None}
+        fits = _fits(patients, sd, population, fits)
         # then the population that their parabolas make likeliest
-        before = population
-        population = _likeliest(before, [one.information for one in fits.values()])
+        before, films = (
+            population,
+            [
+                one.information.of_all(patients[name].read.lowest, population.segments)
+                for name, one in fits.items()
+            ],
+        )
+        population = _likeliest(before, films)
         change = _change(before, population)
         if change < LAST_ROUND or not fits:
             break
-    films = [one.information.matrix for one in fits.values()]
-    population = replace(population, unsure=unsure_means(population, films))
+    told = unsure_means(population, [one.matrix for one in films])
+    population = replace(population, unsure=told)
     unfitted = tuple(name for name in patients if name not in fits)
     return PopulationEstimate(population, rounds, change, len(fits), unfitted, change < LAST_ROUND)
+
+
+def _fits(
+    patients: Mapping[str, Patient],
+    sd: FilmSd,
+    population: Population,
+    before: Mapping[str, FilmFitResult],
+) -> dict[str, FilmFitResult]:
+    """Fits by name, those of the same segments in lockstep; without patients that have no pose."""
+    alike = defaultdict[tuple[int, int], list[str]](list)
+    for name, patient in patients.items():
+        alike[patient.read.lowest, patient.chain.n_joints].append(name)
+    found: dict[str, FilmFitResult | None] = {}
+    for part, names in alike.items():
+        problems = [FilmFit(patients[name], sd) for name in names]
+        ends = fit_alike(problems, population.of_part(*part), [before.get(name) for name in names])
+        found |= zip(names, ends, strict=True)
+    return {name: one for name in patients if (one := found[name]) is not None}
 
 
 def _likeliest(population: Population, patients: list[FilmInformation]) -> Population:

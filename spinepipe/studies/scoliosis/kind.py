@@ -20,6 +20,7 @@ OF_JOBS = ("laws", "positions", "displacements", "curves", "absolute_stiffness")
 _ANALYSES = (
     Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
     Job("clinical", "", (), ("clinical",)),
+    Job("not_read", "", (), ("not_read",)),
     Job("variation", "", ("variants",), ("variation",)),
     Job("by_range", "", ("displacements",), ("by_range",)),
     Job("statistics", "significance", ("positions", "displacements", "curves"), ("statistics",)),

@@ -19,6 +19,7 @@ from spinepipe.studies.scoliosis.tables import (
     DISPLACEMENTS,
     JALALIAN_2017_COHORTS,
     LAWS,
+    NOT_READ,
     POPULATION,
     POSITIONS,
     STATISTICS,
@@ -52,6 +53,7 @@ _READ = (
     POSITIONS,
     DISPLACEMENTS,
     CURVES,
+    NOT_READ,
     VARIANTS,
     AGAINST_JALALIAN_2017,
 )

@@ -93,17 +93,21 @@ class Patient:
         return FixedEndSpine.of(model, self.erect, self.level)
 
     def errors(self, position: str, posed: SpinePose) -> dict[str, float | None]:
-        """Root mean square errors of a pose, all segments and vertebrae; None without a pose."""
+        """Root mean square errors of a pose, what the film has of segments and vertebrae.
+
+        None without a pose, or where no two neighbours are read.
+        """
         if posed.result.status not in POSED:
             return dict.fromkeys(ERRORS)
-        film = self.read.films[position]
+        film, read = self.read.films[position], self.read.compared(position)[1:]
         away = np.hypot(posed.film.right - film.right, posed.film.up - film.up)[1:]
+        turned = (posed.r - self.read.turned(position))[self.read.compared_turns(position)]
         errors = (
-            DEG_PER_RAD * (posed.r - self.read.turned(position)),
-            MM_PER_M * away,
-            DEG_PER_RAD * (posed.film.tilt - film.tilt)[1:],
+            DEG_PER_RAD * turned,
+            MM_PER_M * away[read],
+            DEG_PER_RAD * (posed.film.tilt - film.tilt)[1:][read],
         )
-        sizes = (float(np.sqrt(np.mean(one**2))) for one in errors)
+        sizes = (float(np.sqrt(np.mean(one**2))) if len(one) else None for one in errors)
         return dict(zip(ERRORS, sizes, strict=True))
 
     @cached_property
@@ -156,7 +160,8 @@ def patient_of(study: Scoliosis, cohort: Cohort, name: str) -> Patient:
     """A patient of a cohort whose films are sound."""
     read = read_films(cohort, name)
     erect = read.films[ERECT]
-    chain = geometry(name, cohort.joint_names, erect, study.profile)
+    joints = cohort.joint_names[read.lowest : read.lowest + len(read.vertebrae) - 1]
+    chain = geometry(name, joints, erect, study.profile)
     right, left = (
         arms(
             study.profile.endplate_share,
@@ -166,7 +171,7 @@ def patient_of(study: Scoliosis, cohort: Cohort, name: str) -> Patient:
         for position in (RIGHT, LEFT)
     )
     # the segment below the apical vertebra of the thoracolumbar or lumbar curve
-    apex = max(lumbar_apex(erect, cohort.vertebrae) - 1, 0)
+    apex = max(lumbar_apex(erect, read.vertebrae) - 1, 0)
     pairs = Pairs(read.turned(RIGHT), read.turned(LEFT), right, left, apex)
     size = size_of(pairs, study)
     stated = np.array(study.stiffness.in_order(), dtype=float)

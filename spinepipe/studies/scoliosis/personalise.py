@@ -119,7 +119,7 @@ def rows_of(
         )
         for table, rows in (
             (DISPLACEMENTS, _displacements(settings, patient, position, posed)),
-            (CURVES, _curves(cohort, patient, position, posed)),
+            (CURVES, _curves(patient, position, posed)),
         ):
             found[table.name] += [where | row | ended for row in rows]
     return found
@@ -133,6 +133,7 @@ def _personal(
         personal = WAYS[model](patient, settings)
         return personal, _of_fit(personal), ""
     everyone, sd = population_of(population)
+    everyone = everyone.of_part(patient.read.lowest, patient.chain.n_joints)
     fit = FilmFit(patient, sd)
     try:
         fitted = fit.fit(everyone)
@@ -214,35 +215,41 @@ def _displacements(
 ) -> Iterator[Row]:
     ends, film = ends_of(patient.pairs, settings.enlargement), patient.read.films[position]
     off = MM_PER_M * np.stack([posed.film.right - film.right, posed.film.up - film.up], axis=1)[1:]
+    read, turns = patient.read.compared(position)[1:], patient.read.compared_turns(position)
     measured, there = patient.read.turned(position), posed.result.status in POSED
     sides = np.where(measured > 0.0, ends.upper, -ends.lower)
     for number, joint in enumerate(patient.chain.joints):
         yield {
             "joint": joint,
-            "measured_deg": DEG_PER_RAD * float(measured[number]),
+            "measured_deg": DEG_PER_RAD * float(measured[number]) if turns[number] else None,
             "simulated_deg": DEG_PER_RAD * float(posed.r[number]) if there else None,
-            "off_right_mm": float(off[number, 0]) if there else None,
-            "off_up_mm": float(off[number, 1]) if there else None,
+            "off_right_mm": float(off[number, 0]) if there and read[number] else None,
+            "off_up_mm": float(off[number, 1]) if there and read[number] else None,
             "share_of_range": abs(float(measured[number])) / float(sides[number]),
             "opposite": bool(patient.pairs.opposite[number]),
         }
 
 
-def _curves(cohort: Cohort, patient: Patient, position: str, posed: SpinePose) -> Iterator[Row]:
+def _curves(patient: Patient, position: str, posed: SpinePose) -> Iterator[Row]:
     film, there = patient.read.films[position], posed.result.status in POSED
+    read, vertebrae = patient.read.compared(position), patient.read.vertebrae
     for number, curve in enumerate(patient.curves):
+        ends, points = (
+            read[[curve.lower, curve.upper]],
+            read[[curve.lower, curve.apex, curve.upper]],
+        )
         simulated = {
             "cobb_simulated_deg": DEG_PER_RAD * curve.cobb(posed.film) if there else None,
             "ferguson_simulated_deg": DEG_PER_RAD * curve.ferguson(posed.film) if there else None,
         }
         yield {
             "curve": number,
-            "region": region(cohort.vertebrae[curve.apex]),
+            "region": region(vertebrae[curve.apex]),
             "side": "right" if curve.side > 0 else "left",
-            "lower_vertebra": cohort.vertebrae[curve.lower],
-            "apex_vertebra": cohort.vertebrae[curve.apex],
-            "upper_vertebra": cohort.vertebrae[curve.upper],
-            "cobb_measured_deg": DEG_PER_RAD * curve.cobb(film),
-            "ferguson_measured_deg": DEG_PER_RAD * curve.ferguson(film),
+            "lower_vertebra": vertebrae[curve.lower],
+            "apex_vertebra": vertebrae[curve.apex],
+            "upper_vertebra": vertebrae[curve.upper],
+            "cobb_measured_deg": DEG_PER_RAD * curve.cobb(film) if ends.all() else None,
+            "ferguson_measured_deg": DEG_PER_RAD * curve.ferguson(film) if points.all() else None,
             **simulated,
         }

@@ -21,6 +21,7 @@ from spinepipe.studies.scoliosis.films import (
     by_reading,
     corners,
     film_of_rows,
+    read_rows,
     run_around,
 )
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -71,17 +72,20 @@ def doubts(cohort: Cohort) -> Iterator[PlausibilityWarning]:
 
 def _fault(cohort: Cohort, rows: pd.DataFrame) -> _Fault | None:
     """What is wrong with the films of a patient, the first thing that hides the rest."""
-    films = []
+    films, named = [], []
+    rows = rows[rows[list(CENTRE)].notna().all(axis=1) | rows[list(CORNERS)].notna().all(axis=1)]
     for _, film in rows.groupby("position", sort=False):
-        for reading in by_reading(film):
-            whole = any(reading[list(c)].notna().all(axis=None) for c in (CENTRE, CORNERS))
-            if sorted(reading["vertebra"]) == sorted(cohort.vertebrae) and whole:
-                films.append(film_of_rows(reading, cohort.vertebrae))
+        for reading in by_reading(read_rows(film)):
+            there = reading["vertebra"]
+            names = tuple(name for name in cohort.vertebrae if (there == name).any())
+            if len(there) == len(names) > 1:
+                films.append(film_of_rows(reading, names))
+                named.append(names)
     if not films:
         return None
     if rows[list(CORNERS)].notna().all(axis=None):
-        return _corners(rows) or _direction(films, *CORNERS[:2]) or _size(cohort, films, CORNERS)
-    found = _direction(films, *CENTRE[:2]) or _size(cohort, films, CENTRE[:2])
+        return _corners(rows) or _direction(films, *CORNERS[:2]) or _size(films, named, CORNERS)
+    found = _direction(films, *CENTRE[:2]) or _size(films, named, CENTRE[:2])
     return found or _tilts(films)
 
 
@@ -94,19 +98,20 @@ def _direction(films: list[Film], y: str, z: str) -> _Fault | None:
     return _Fault("films_upside_down", z) if up < 0.0 else None
 
 
-def _size(cohort: Cohort, films: list[Film], columns: Sequence[str]) -> _Fault | None:
-    """Neighbouring centres much nearer or farther than those of their levels."""
-    levels = [spacing_mm(name) for name in cohort.vertebrae]
-    pairs = [
-        (k, (low + high) / 2.0)
-        for k, (low, high) in enumerate(pairwise(levels))
-        if low is not None and high is not None
-    ]
-    ratios = [
-        MM_PER_M * float(np.hypot(np.diff(film.right)[k], np.diff(film.up)[k])) / level
-        for film in films
-        for k, level in pairs
-    ]
+def _size(films: list[Film], named: list[tuple[str, ...]], columns: Sequence[str]) -> _Fault | None:
+    """Centres of those read much nearer or farther than those of their levels.
+
+    Vertebrae between that were not read make a pair seem farther; the typical pair has none.
+    """
+    ratios = []
+    for film, names in zip(films, named, strict=True):
+        apart = MM_PER_M * np.hypot(np.diff(film.right), np.diff(film.up))
+        levels = pairwise(map(spacing_mm, names))
+        ratios += [
+            float(one) / ((low + high) / 2.0)
+            for one, (low, high) in zip(apart, levels, strict=True)
+            if low is not None and high is not None
+        ]
     size = typical(ratios) if ratios else 1.0
     if usual("spine_size").holds(size):
         return None
@@ -118,9 +123,10 @@ def _size(cohort: Cohort, films: list[Film], columns: Sequence[str]) -> _Fault |
 
 def _tilts(films: list[Film]) -> _Fault | None:
     """Tilts beside the line through the centres."""
-    line = np.array([np.arctan2(np.gradient(f.right), np.gradient(f.up)) for f in films])
-    tilt = np.array([film.tilt for film in films])
-    line, tilt = line[:, 1:-1].ravel(), tilt[:, 1:-1].ravel()
+    lines = [np.arctan2(np.gradient(f.right), np.gradient(f.up))[1:-1] for f in films]
+    line, tilt = np.concatenate(lines), np.concatenate([film.tilt[1:-1] for film in films])
+    if not len(line):
+        return None
     if DEG_PER_RAD * float(np.sqrt(np.mean(line**2))) < usual("film_tilt").low:
         return None
     if np.ptp(tilt) == 0.0:

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from spinepipe.effects.contract import Array
@@ -64,6 +65,12 @@ class Population:
         """S."""
         return len(self.mean) // len(PER_SEGMENT)
 
+    def of_part(self, lowest: int, segments: int) -> "Population":
+        """That of so many neighbouring segments, whose ratios stay over the mean of all."""
+        at = places_among(lowest, segments, self.segments)
+        unsure = np.broadcast_to(self.unsure, self.mean.shape)[at]
+        return replace(self, mean=self.mean[at], unsure=unsure)
+
     @property
     def sd(self) -> Array:
         """(3 S,) SD of each number."""
@@ -92,6 +99,11 @@ class Population:
         alike = np.full((2 * s, 2 * s), 1.0 / (2 * s))
         found[s:, s:] = (np.eye(2 * s) - alike) / self.end_sd + alike / whole
         return found
+
+
+def places_among(lowest: int, part: int, segments: int) -> NDArray[np.int64]:
+    """(3 part,) places of the numbers of a part of a spine among those of all its segments."""
+    return (np.arange(len(PER_SEGMENT))[:, None] * segments + lowest + np.arange(part)).ravel()
 
 
 def usual_population(segments: int) -> Population:

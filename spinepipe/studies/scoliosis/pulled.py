@@ -22,7 +22,7 @@ from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed_chain import PrescribedChain, PrescribedPlace, Tilt
 from spinepipe.status import PrescribedStatus
 from spinepipe.studies.scoliosis.film_fit import FilmFit
-from spinepipe.studies.scoliosis.films import Film, FilmSd
+from spinepipe.studies.scoliosis.films import Film, FilmSd, Flags
 from spinepipe.studies.scoliosis.fixed_end_spine import ANTERIOR, UP, FixedEndSpine, SpinePose
 from spinepipe.studies.scoliosis.personal import Patient
 from spinepipe.studies.scoliosis.population import PatientPrior
@@ -58,25 +58,28 @@ def pulled_spine(patient: Patient, model: SpineModel, depth_mm: float) -> FixedE
     return FixedEndSpine(PrescribedChain(model, grips, free), erect)
 
 
-def pull_of(spine: FixedEndSpine, film: Film, sd: FilmSd) -> Pull | None:
+def pull_of(spine: FixedEndSpine, film: Film, sd: FilmSd, seen: Flags | None = None) -> Pull | None:
     """Least squares of all places and tilts but the lowest's, over height and the film's frame.
+
+    Of the vertebrae (V,) that are seen; all, where it is not told.
 
     None where the way to the film has no stable pose.
     """
     along = spine.chain.prescriptions[0].vectors[1]
     height, near = float(along @ [0.0, film.up[-1], film.right[-1]]), None
+    at = np.arange(1, len(film.up)) if seen is None else 1 + np.flatnonzero(seen[1:])
     for _ in range(MOST_STEPS):
         posed = spine.at(np.array([height]), near)
         if posed.result.status is not PrescribedStatus.CONVERGED:
             return None
         near = posed.result
         by_height, push_by_height = _by_height(posed)
-        right, up, _ = film.rows[:, 1:]
+        right, up, _ = film.rows[:, at]
         moves = np.zeros((3, len(up), 4))
-        moves[..., 0] = posed.film_by @ by_height
+        moves[..., 0] = posed.film_by[:, at - 1] @ by_height
         moves[0, :, 1], moves[1, :, 2] = -1.0, -1.0
         moves[:, :, 3] = -np.stack([up, -right, np.ones_like(up)])
-        off = (posed.film.rows - film.rows)[:, 1:] / sd.vertebra[:, None]
+        off = (posed.film.rows - film.rows)[:, at] / sd.vertebra[:, None]
         slopes = (moves / sd.vertebra[:, None, None]).reshape(-1, 4)
         # errors of the frame are drawn about nothing; a model misses the lowest vertebra's, too
         frame = np.diag([0.0, *1.0 / sd.vertebra])
@@ -133,7 +136,10 @@ def stiffness_by_pulls(
     for number, away in enumerate([np.zeros(len(known.mean)), *half, *-half]):
         numbers = known.mean + root @ away
         spine = pulled_spine(patient, fit.model_of(numbers), depth_mm)
-        pulls = [pull_of(spine, patient.read.films[name], fit.sd) for name in stated]
+        pulls = [
+            pull_of(spine, patient.read.films[name], fit.sd, patient.read.compared(name))
+            for name in stated
+        ]
         scale = _scale(list(stated.values()), pulls, rng.normal() if number else 0.0)
         if scale is not None:
             found.append(np.log(scale * fit.size / DEG_PER_RAD) + numbers[:s])

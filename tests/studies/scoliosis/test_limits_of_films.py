@@ -182,13 +182,13 @@ def test_vertebrae_are_as_far_apart_as_those_of_a_spine_to_a_factor(
     up = size * np.concatenate([[0.0], np.cumsum((usual[1:] + usual[:-1]) / 2.0)])
     films = [Film(0.6 * up, 0.8 * up, np.zeros(4))] * 2
     for columns, column in ((CENTRE[:2], "y_mm"), (CORNERS, "upper_left_y_mm")):
-        found = fault(plausibility._size(COHORT, films, columns))
+        found = fault(plausibility._size(films, [LEVELS] * 2, columns))
         assert found == (None if told is None else (column, told))
 
 
 def test_names_that_are_no_levels_have_no_size() -> None:
-    cohort: Any = SimpleNamespace(vertebrae=("a", "b", "c", "d"))
-    assert plausibility._size(cohort, [leaning(0, 0, 0, 0, apart=5.0)], CENTRE[:2]) is None
+    films = [leaning(0, 0, 0, 0, apart=5.0)]
+    assert plausibility._size(films, [("a", "b", "c", "d")], CENTRE[:2]) is None
 
 
 def curved(size: float, factor: float, mixed: float = 0.0) -> list[Film]:

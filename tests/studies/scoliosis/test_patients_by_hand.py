@@ -28,6 +28,7 @@ from spinepipe.studies.scoliosis.personal import (
     geometric_mean,
     size_of,
 )
+from spinepipe.studies.scoliosis.population import usual_population
 from spinepipe.studies.scoliosis.settings import SagittalProfile, Scoliosis
 from spinepipe.studies.scoliosis.tangent_laws import (
     EndRotations,
@@ -211,11 +212,13 @@ def test_films_are_asked_of_ratios_where_the_study_wants_it(
     regions: bool, arrived: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     reach = (RegionEnds(0.5, 2.0, False, False),) * 2
-    monkeypatch.setattr(personalise, "population_of", lambda rows: (None, None))
+    monkeypatch.setattr(personalise, "population_of", lambda rows: (usual_population(2), None))
     monkeypatch.setattr(personalise, "FilmFit", Fit)
     monkeypatch.setattr(personalise, "regions", lambda *_: reach)
     monkeypatch.setattr(Fit, "arrived", arrived)
-    patient: Any = SimpleNamespace(read=SimpleNamespace(traction={}))
+    patient: Any = SimpleNamespace(
+        read=SimpleNamespace(traction={}, lowest=0), chain=SimpleNamespace(n_joints=2)
+    )
     asked = study(film_regions=regions)
     found, told, absolute = personalise._personal(asked, patient, "tangent_fitted", TABLE)
     assert absolute == ""
@@ -271,7 +274,8 @@ def test_rows_of_a_pose_are_in_mm_and_degrees(status: PrescribedStatus) -> None:
     """Missed by 3 and 4 mm and -2 deg; the film's spine is twice as long as erect."""
     erect = Film(np.zeros(3), np.array([0.0, 0.04, 0.08]), np.zeros(3))
     films = {"erect": erect, "neutral": scaled(erect, 2.0)}
-    read = personal.PatientFilms(films, {"neutral": 1.1}, np.full(3, np.nan), {})
+    names = ("L4", "L3", "L2")
+    read = personal.PatientFilms(films, {"neutral": 1.1}, np.full(3, np.nan), {}, vertebrae=names)
     pairs = Pairs(np.deg2rad([5.0, 5.0]), np.deg2rad([-4.0, -4.0]), *[np.ones(2)] * 2, 0)
     patient: Any = SimpleNamespace(
         read=read,
@@ -299,11 +303,21 @@ def test_rows_of_a_pose_are_in_mm_and_degrees(status: PrescribedStatus) -> None:
     cells = ("simulated_deg", "off_right_mm", "off_up_mm")
     expected = (1.0, 3.0, 4.0) if there else (None,) * 3
     assert tuple(one[name] for name in cells) == pytest.approx(expected)
-    cohort: Any = SimpleNamespace(vertebrae=("L4", "L3", "L2"))
-    right, left = personalise._curves(cohort, patient, "neutral", posed)
+    right, left = personalise._curves(patient, "neutral", posed)
     assert (right["curve"], right["side"], left["curve"], left["side"]) == (0, "right", 1, "left")
     assert [right[f"{end}_vertebra"] for end in ("lower", "apex", "upper")] == ["L4", "L3", "L2"]
     assert (right["region"], right["cobb_measured_deg"]) == ("TL/L", pytest.approx(-1.0))
     assert right["cobb_simulated_deg"] == (pytest.approx(4.0) if there else None)
     bulge = np.rad2deg(np.arctan2(3, 84) + np.arctan2(3, 76))
     assert left["ferguson_simulated_deg"] == (pytest.approx(-bulge) if there else None)
+    # without the middle vertebra, no rotation and no line to the apex; the ends' tilts remain
+    patient.read = replace(read, seen={"neutral": np.array([True, False, True])})
+    one, other = personalise._displacements(study(), patient, "neutral", posed)
+    assert one["measured_deg"] is other["measured_deg"] is one["off_up_mm"] is None
+    assert (other["off_up_mm"] is None) is not there
+    right, _ = personalise._curves(patient, "neutral", posed)
+    assert right["cobb_measured_deg"] == pytest.approx(-1.0)
+    assert right["ferguson_measured_deg"] is None
+    errors = patient.errors("neutral", posed)
+    assert errors["rotation_rmse_deg"] is None
+    assert errors["tilt_rmse_deg"] == (pytest.approx(4.0) if there else None)

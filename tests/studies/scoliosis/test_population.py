@@ -87,8 +87,9 @@ def moved(by: float) -> Any:
 def test_rounds_end_when_the_population_stands_still_or_after_twenty(
     by: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = SimpleNamespace(information=SimpleNamespace(matrix=np.eye(6)))
-    monkeypatch.setattr(learning, "patient_of", lambda *_: None)
+    told = SimpleNamespace(information=FilmInformation(np.eye(6), np.zeros(6)))
+    patient = SimpleNamespace(read=SimpleNamespace(lowest=0), chain=SimpleNamespace(n_joints=2))
+    monkeypatch.setattr(learning, "patient_of", lambda *_: patient)
     monkeypatch.setattr(learning, "FilmFit", lambda *_: None)
     monkeypatch.setattr(learning, "fit_alike", lambda *_: [told, None])
     monkeypatch.setattr(learning, "_likeliest", moved(by))

@@ -166,6 +166,14 @@ AT_LIMIT = corrected(("tangent_fitted", "uniform", 0.05), BETTER[1])
 AGAINST_MEAN = corrected(("uniform", "tangent_fitted", 0.01), BETTER[1])
 RISING, FALLING = {10.0: 0.3, 20.0: 0.4, 40.0: 0.5}, {10.0: 0.5, 20.0: 0.4, 40.0: 0.3}
 
+GAPS = [
+    {"specimen": "p01", "position": RIGHT, "made_of_it": "interpolated"},
+    {"specimen": "p01", "position": LEFT, "made_of_it": "interpolated"},
+    {"specimen": "p02", "position": LEFT, "made_of_it": "spine_shortened"},
+    {"specimen": "p02", "position": RIGHT, "made_of_it": "spine_shortened"},
+    *[{"specimen": "p03", "position": "neutral", "made_of_it": "film_left_out"}] * 3,
+]
+
 STUDIES: list[tuple[str, dict[str, pd.DataFrame]]] = [
     ("best:clear personal:some error:left_out margin:nearest above_noise:within", study()),
     ("noise:check_step detectable:known top:given methods:apical_moment", study()),
@@ -208,6 +216,7 @@ STUDIES: list[tuple[str, dict[str, pd.DataFrame]]] = [
     ("poses:stop", few_lost(3, "not_converged")),
     ("poses:ok reached:check", few_lost(1, "unreachable")),
     ("population:check", {"population": pd.DataFrame({"status": ["not_converged"]})}),
+    ("not_read:check", {"not_read": pd.DataFrame(GAPS)}),
     ("enlargement:end tried:check_end", study(**varied({0.0: LOST, **FALLING}))),
     ("enlargement:end tried:check_end", study(**varied({0.0: LOST, **RISING}))),
     ("enlargement:inside tried:ok", study(**varied({**FALLING, 50.0: 0.6}))),
@@ -239,6 +248,13 @@ def test_rules_come_to_the_verdict_of_the_numbers(
         expected.split()
     )
     assert not list(faults_of_told(told(found, sentences_of(PACKAGE))))
+
+
+def test_vertebrae_films_and_spines_of_gaps_are_counted() -> None:
+    gaps = {"not_read": pd.DataFrame(GAPS)}
+    (found,) = (one for one in concluded(gaps) if one.rule == "not_read")
+    counts = {name: value.number for name, value in found.values.items()}
+    assert counts == {"spines": 3, "between": 2, "shortened": 1, "films": 1}
 
 
 def test_every_sentence_is_reached() -> None:
