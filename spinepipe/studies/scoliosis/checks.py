@@ -81,7 +81,7 @@ def check_scoliosis(
         if ERECT in shapes:
             yield from _cobb(cohort, patient, shapes[ERECT])
         # then what films of one patient say of each other, by the vertebrae that all of them have
-        shared = np.all([seen[name] for name in shapes] or [[False]], axis=0)
+        shared = np.all([seen[name] for name in shapes] or [np.zeros(1, dtype=bool)], axis=0)
         if shared.sum() >= FEWEST:
             alike = {
                 name: Film(*film.rows[:, shared[seen[name]]]).seen_from_below()

@@ -104,9 +104,9 @@ def _size(films: list[Film], named: list[tuple[str, ...]], columns: Sequence[str
     Vertebrae between that were not read make a pair seem farther; the typical pair has none.
     """
     ratios = []
-    for film, names in zip(films, named, strict=True):
+    for film, read in zip(films, named, strict=True):
         apart = MM_PER_M * np.hypot(np.diff(film.right), np.diff(film.up))
-        levels = pairwise(map(spacing_mm, names))
+        levels = pairwise(map(spacing_mm, read))
         ratios += [
             float(one) / ((low + high) / 2.0)
             for one, (low, high) in zip(apart, levels, strict=True)
