@@ -58,6 +58,7 @@ def conclusions(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Iter
         yield from _personal(left_out)
         yield from _others(tables)
         yield from _above_noise(left_out)
+    yield from _without_top(results.table("accuracy_without_top"))
     for compared in (left_out, fitted):
         yield from _published(compared)
     yield from _ratios(results.table("laws"))
@@ -189,6 +190,34 @@ def _above_noise(left_out: Compared) -> Iterator[Conclusion]:
     noise = Value(left_out.noise, "°", source="accuracy: reading_noise")
     verdict = "above" if above else "within"
     yield Conclusion("above_noise", verdict, {"error": least, "noise": noise})
+
+
+def _without_top(rows: pd.DataFrame) -> Iterator[Conclusion]:
+    """What the law of least error is worth where the top has to be found, all positions together.
+
+    Of the laws with the most poses.
+    """
+    rows = rows.dropna(subset=["rmse"]) if len(rows) else rows
+    if rows.empty:
+        return
+    errors = ["rmse", "rmse_given_top", "rmse_unmoved"]
+    squares = rows.assign(**{name: rows[name] ** 2 * rows["n_patients"] for name in errors})
+    sums = squares.groupby(["measure", "model"], sort=False)[[*errors, "n_patients"]].sum()
+    found = sums[errors].div(sums["n_patients"], axis=0) ** 0.5
+    counts = sums.xs(DECIDING)["n_patients"]
+    law = str(found.xs(DECIDING)["rmse"][counts == counts.max()].idxmin())
+    values = {
+        name: Value(float(number), unit, source=f"accuracy_without_top: {column}")
+        for measure, unit, names in (
+            (DECIDING, "°", ("error", "given", "unmoved")),
+            ("place", "mm", ("place", "place_given", "place_unmoved")),
+        )
+        for name, column, number in zip(names, errors, found.xs((measure, law)), strict=True)
+    }
+    verdict = "better" if values["place"].number < values["place_unmoved"].number else "not_places"
+    if values["error"].number >= values["unmoved"].number:
+        verdict = "none"
+    yield Conclusion("without_top", verdict, values, {"law": LAWS[law]})
 
 
 def _published(compared: Compared) -> Iterator[Conclusion]:

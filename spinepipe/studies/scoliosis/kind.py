@@ -19,6 +19,7 @@ OF_JOBS = ("laws", "positions", "displacements", "curves", "absolute_stiffness")
 
 _ANALYSES = (
     Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
+    Job("accuracy_without_top", "without_top", ("laws", "positions"), ("accuracy_without_top",)),
     Job("clinical", "", (), ("clinical",)),
     Job("not_read", "", (), ("not_read",)),
     Job("variation", "", ("variants",), ("variation",)),

@@ -13,6 +13,7 @@ from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
     ABSOLUTE_STIFFNESS,
     ACCURACY,
+    ACCURACY_WITHOUT_TOP,
     AGAINST_JALALIAN_2017,
     BY_RANGE,
     CURVES,
@@ -32,6 +33,10 @@ _SHOWN = {
         "Errors of every law",
         "films measure model n_patients mean_of_patients sd_of_patients reading_noise unit "
         "free_parameters decided_parameters",
+    ),
+    ACCURACY_WITHOUT_TOP: (
+        "Errors where the top vertebra is not given",
+        "position measure model n_patients rmse rmse_given_top rmse_unmoved unit",
     ),
     STATISTICS: ("Corrected tests of pairs of laws", "family response factor n effect p_holm"),
     BY_RANGE: ("Errors by size of the rotation", "films opposite range model n rmse_deg"),

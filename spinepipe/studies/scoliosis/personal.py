@@ -215,8 +215,7 @@ def tangent(patient: Patient, study: Scoliosis) -> PersonalModel:
     at_rest = ends.at_rest(laws.stretch)
     # all models have one size: films decide ratios, the scale comes from outside
     factor = patient.size / geometric_mean(at_rest)
-    values = np.column_stack([factor * laws.stretch, ends.lower, ends.upper])
-    model = with_laws(patient.chain, patient.springs, values)
+    model = model_of_law(patient, factor * at_rest, ends)
     free = 3 * len(at_rest) + 1
     return PersonalModel(model, factor * at_rest, ends, laws.constrained, free, free)
 
@@ -225,7 +224,7 @@ def linear_per_segment(patient: Patient, study: Scoliosis) -> PersonalModel:
     """A spring for each segment from the same pairs."""
     laws = characterise(patient.pairs, LinearShape(), study.scale.apical_moment_nm)
     at_rest = laws.stretch * patient.size / geometric_mean(laws.stretch)
-    model = with_springs(patient.chain, _with_bending(patient, at_rest))
+    model = model_of_law(patient, at_rest, None)
     free = len(at_rest) + 1
     return PersonalModel(model, at_rest, None, laws.constrained, free, free)
 
@@ -236,7 +235,7 @@ def uniform(patient: Patient, study: Scoliosis) -> PersonalModel:
 
 
 def _springs(patient: Patient, at_rest: Array, free: int) -> PersonalModel:
-    model = with_springs(patient.chain, _with_bending(patient, at_rest))
+    model = model_of_law(patient, at_rest, None)
     return PersonalModel(model, at_rest, None, np.zeros(len(at_rest), dtype=bool), free, free)
 
 
@@ -298,7 +297,7 @@ class RegionFit:
     def missed(self, logs: Array) -> tuple[Array, Array] | None:
         """Errors of the angles, rad, right and left film, and by each logarithm."""
         patient, springs = self.patient, self.stiffness(logs)
-        spine = self.spine.with_values(_with_bending(patient, springs))
+        spine = self.spine.with_values(with_bending(patient, springs))
         errors, slopes = [], []
         for position in (RIGHT, LEFT):
             film = patient.read.films[position]
@@ -324,7 +323,16 @@ def _regions(patient: Patient) -> Regions:
     return np.searchsorted(np.array(tops), np.arange(patient.chain.n_joints), side="right")
 
 
-def _with_bending(patient: Patient, at_rest: Array) -> Array:
+def model_of_law(patient: Patient, at_rest: Array, ends: EndRotations | None) -> SpineModel:
+    """The model of a personal law: (S,) N m/rad at rest; tangents where it has ends."""
+    if ends is None:
+        return with_springs(patient.chain, with_bending(patient, at_rest))
+    stretch = at_rest / ends.at_rest(np.ones(len(at_rest)))
+    values = np.column_stack([stretch, ends.lower, ends.upper])
+    return with_laws(patient.chain, patient.springs, values)
+
+
+def with_bending(patient: Patient, at_rest: Array) -> Array:
     """(S, 6) springs with this lateral stiffness."""
     springs = patient.springs.copy()
     springs[:, BENDING] = at_rest

@@ -28,8 +28,9 @@ from spinepipe.studies.scoliosis.personal import Patient
 from spinepipe.studies.scoliosis.population import PatientPrior
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
-MOST_STEPS, SETTLED = 60, 0.02
-"""Gauss-Newton's, and the share of the height's SD that the last one may change."""
+MOST_STEPS, SETTLED, SETTLED_M = 60, 0.02, 1e-6
+"""Steps of Newton and Gauss-Newton, the share of the height's SD that the last one may change, and
+so far in m where a pull is given."""
 
 DRAWS, LEVEL = 40, 0.95
 """Laws drawn from what is known of a patient, and the level of intervals."""
@@ -93,6 +94,24 @@ def pull_of(spine: FixedEndSpine, film: Film, sd: FilmSd, seen: Flags | None = N
     else:
         return None
     return Pull(float(near.pushes[0]), abs(push_by_height) * height_sd)
+
+
+def under_pull(spine: FixedEndSpine, newton: float) -> SpinePose | None:
+    """The pose under a pull (N at the model's size of stiffness); None where none is found."""
+    right, up, _ = spine.erect.top
+    last = height = float(spine.chain.prescriptions[0].vectors[1] @ [0.0, up, right])
+    near = None
+    for _ in range(MOST_STEPS):
+        posed = spine.at(np.array([height]), near)
+        if posed.result.status is not PrescribedStatus.CONVERGED:
+            height = 0.5 * (last + height)  # laws stiffen: a step from below goes too far
+            continue
+        near, last = posed.result, height
+        step = (newton - float(near.pushes[0])) / _by_height(posed)[1]
+        if abs(step) < SETTLED_M:
+            return posed
+        height += step
+    return None
 
 
 def _by_height(posed: SpinePose) -> tuple[Array, float]:

@@ -166,6 +166,26 @@ AT_LIMIT = corrected(("tangent_fitted", "uniform", 0.05), BETTER[1])
 AGAINST_MEAN = corrected(("uniform", "tangent_fitted", 0.01), BETTER[1])
 RISING, FALLING = {10.0: 0.3, 20.0: 0.4, 40.0: 0.5}, {10.0: 0.5, 20.0: 0.4, 40.0: 0.3}
 
+
+def top_found(rotation: float, place: float) -> dict[str, pd.DataFrame]:
+    """Errors of two positions without the top; 1 deg and 3 mm if the spine stayed erect.
+
+    A law of fewer poses errs less, which is no merit.
+    """
+    rows = [
+        {"position": position, "measure": measure, "model": law, "n_patients": n, "rmse": error}
+        | {"rmse_given_top": 0.5, "rmse_unmoved": unmoved}
+        for position in ("neutral", "traction")
+        for measure, error, unmoved in (("rotation", rotation, 1.0), ("place", place, 3.0))
+        for law, n, error in (
+            ("uniform", 3, error),
+            ("tangent", 3, 1.1 * error),
+            ("linear_regions", 2, 0.1),
+        )
+    ]
+    return {"accuracy_without_top": pd.DataFrame(rows)}
+
+
 GAPS = [
     {"specimen": "p01", "position": RIGHT, "made_of_it": "interpolated"},
     {"specimen": "p01", "position": LEFT, "made_of_it": "interpolated"},
@@ -216,6 +236,9 @@ STUDIES: list[tuple[str, dict[str, pd.DataFrame]]] = [
     ("poses:stop", few_lost(3, "not_converged")),
     ("poses:ok reached:check", few_lost(1, "unreachable")),
     ("population:check", {"population": pd.DataFrame({"status": ["not_converged"]})}),
+    ("without_top:better", top_found(0.99, 2.9)),
+    ("without_top:not_places", top_found(0.99, 3.1)),
+    ("without_top:none", top_found(1.01, 2.9)),
     ("not_read:check", {"not_read": pd.DataFrame(GAPS)}),
     ("enlargement:end tried:check_end", study(**varied({0.0: LOST, **FALLING}))),
     ("enlargement:end tried:check_end", study(**varied({0.0: LOST, **RISING}))),
@@ -255,6 +278,18 @@ def test_vertebrae_films_and_spines_of_gaps_are_counted() -> None:
     (found,) = (one for one in concluded(gaps) if one.rule == "not_read")
     counts = {name: value.number for name, value in found.values.items()}
     assert counts == {"spines": 3, "between": 2, "shortened": 1, "films": 1}
+
+
+def test_errors_without_the_top_are_pooled_over_positions() -> None:
+    rows = top_found(0.8, 2.0)["accuracy_without_top"]
+    at = (rows["position"] == "traction") & (rows["model"] == "uniform")
+    rows.loc[at, ["rmse", "n_patients"]] = [0.4, 1]
+    rows.loc[rows["model"] != "uniform", "n_patients"] = 1
+    (found,) = (
+        one for one in concluded({"accuracy_without_top": rows}) if one.rule == "without_top"
+    )
+    assert found.names == {"law": "uniform stiffness"}
+    assert found.values["error"].number == pytest.approx(np.sqrt((3 * 0.64 + 0.16) / 4))
 
 
 def test_every_sentence_is_reached() -> None:
