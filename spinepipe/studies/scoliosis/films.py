@@ -172,9 +172,11 @@ def read_films(cohort: Cohort, patient: str) -> PatientFilms:
 
 
 def read_rows(film: pd.DataFrame) -> pd.DataFrame:
-    """Rows of a film that have what most of them have, corners or else centre and tilt."""
+    """Rows that have what most of their reading have, corners or else centre and tilt."""
+    by = [film["observer"], film["repeat"]]
     corner, centre = (film[list(names)].notna().all(axis=1) for names in (CORNERS, CENTRE))
-    found: pd.DataFrame = film[corner if corner.sum() >= centre.sum() else centre]
+    more = (corner.astype(int) - centre.astype(int)).groupby(by, dropna=False).transform("sum") >= 0
+    found: pd.DataFrame = film[corner.where(more, centre)]
     return found
 
 

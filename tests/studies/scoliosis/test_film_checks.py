@@ -97,8 +97,17 @@ def without(position: str, vertebra: str | None = None) -> Callable[[pd.DataFram
     return change
 
 
+def without_all_but(position: str) -> Callable[[pd.DataFrame], pd.DataFrame]:
+    return lambda table: table[on(table, position)]
+
+
 def two_left(table: pd.DataFrame) -> pd.DataFrame:
     return table[~on(table, "left_bending") | table["vertebra"].isin(["L4", "T8"])]
+
+
+def blank(table: pd.DataFrame) -> pd.DataFrame:
+    table.loc[on(table, "erect"), list(CENTRE)] = None
+    return table
 
 
 def emptied(table: pd.DataFrame) -> pd.DataFrame:
@@ -119,6 +128,8 @@ def emptied(table: pd.DataFrame) -> pd.DataFrame:
         (without("erect"), ["no film of p01 in position erect", "add its rows"]),
         (without("left_bending"), ["no film of p01 in position left_bending"]),
         (two_left, ["film left_bending: 2 vertebrae read on all", "at least 3", "read more"]),
+        (blank, ["film erect: 0 vertebrae read on all", "0 on this one"]),
+        (without_all_but("erect"), ["no film of p01 in position right_bending"]),
         (emptied, ["film right_bending", "T5 has no orientation_deg", "fill the cells, or empty"]),
         (twice, ["film erect", "T8 twice", "a position once"]),
     ],
