@@ -163,3 +163,25 @@ def test_a_population_is_learned_from_spines_of_different_length() -> None:
     study = STUDY.model_copy(update={"film_regions": False})
     laws = rows_of(study, cohort, "p02", "tangent_fitted", table)["laws"]
     assert tuple(row["joint"] for row in laws) == cohort.joint_names[:-1]
+
+
+def test_readings_of_one_film_may_be_of_corners_and_of_centres() -> None:
+    """A second reading by corners, of all but one vertebra, moves the mean and makes the gap."""
+    films = WHOLE.further["films"]
+    again = films[(films["position"] == "neutral") & (films["vertebra"] != MIDDLE)].copy()
+    again["repeat"] = 2
+    turn = np.deg2rad(again["orientation_deg"].astype(float))
+    across, up = np.array([np.cos(turn), -np.sin(turn)]), np.array([np.sin(turn), np.cos(turn)])
+    centre = again[["y_mm", "z_mm"]].to_numpy(float).T + np.array([[0.0], [4.0]])
+    for end, side in ((e, s) for e in ("upper", "lower") for s in ("left", "right")):
+        at = centre + across * (20.0 if side == "left" else -20.0)
+        at = at + up * (12.0 if end == "upper" else -12.0)
+        again[[f"{end}_{side}_y_mm", f"{end}_{side}_z_mm"]] = at.T
+    again[["y_mm", "z_mm", "orientation_deg"]] = np.nan
+    cohort = replace(WHOLE, further={**WHOLE.further, "films": pd.concat([films, again])})
+    read, whole = read_films(cohort, "p01"), read_films(WHOLE, "p01")
+    assert read.readings["neutral"] == 2
+    assert not read.compared("neutral")[7]
+    assert read.compared("neutral").sum() == len(WHOLE.vertebrae) - 1
+    off = read.films["neutral"].rows - whole.films["neutral"].rows
+    np.testing.assert_allclose(np.delete(off, 7, axis=1), 0.0, atol=1e-9)
