@@ -9,8 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.studies.read import check
 from spinepipe.studies.registry import files_of
 from spinepipe.studies.scoliosis.film_fit import FilmFit
-from spinepipe.studies.scoliosis.films import ERECT
-from spinepipe.studies.scoliosis.fit_population import weights
+from spinepipe.studies.scoliosis.films import ERECT, weights
 from spinepipe.studies.scoliosis.personal import WAYS, PersonalModel, patient_of
 from spinepipe.studies.scoliosis.population import usual_population
 from spinepipe.studies.scoliosis.settings import Scoliosis

@@ -171,5 +171,5 @@ def test_forms_allow_the_words_that_the_library_knows() -> None:
     assert passive.column("side").allowed == SIDES
     markers = next(form for form in FORMS if form.stem == "marker_set")
     assert markers.rules[0].where == {"vertebra": [BODIES[0]]}
-    assert {*CENTRE, *CORNERS} == set("+".join(FILMS.rules[-1].any_of).split("+"))
-    assert [rule.where for rule in FILMS.rules[:-1]] == [{"position": [one]} for one in NEEDED]
+    assert [rule.together for rule in FILMS.rules[-2:]] == [CENTRE, CORNERS]
+    assert [rule.where for rule in FILMS.rules[:-2]] == [{"position": [one]} for one in NEEDED]

@@ -319,7 +319,7 @@ SOLVING = {
         *("over_load_point", "posterior"),
     },
     "range_of_motion": {"simulate"},
-    "scoliosis": {"personalise", "population", "variants"},
+    "scoliosis": {"personalise", "population", "variants", "accuracy_without_top"},
     "trunk_loads": {"hold", "simplify", "tune", "respond"},
 }
 """Jobs that solve equilibria."""

@@ -13,8 +13,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
 from spinepipe.studies.scoliosis.film_fit import FilmFit
-from spinepipe.studies.scoliosis.films import FILMS, PATIENTS
-from spinepipe.studies.scoliosis.fit_population import fit_population, weights
+from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, weights
+from spinepipe.studies.scoliosis.fit_population import fit_population
 from spinepipe.studies.scoliosis.personal import geometric_mean, patient_of
 from spinepipe.studies.scoliosis.settings import Scoliosis
 from tests.generators import ais_films

@@ -10,7 +10,8 @@ from spinepipe.effects.contract import Array
 from spinepipe.progress import Progress
 from spinepipe.studies.read import check
 from spinepipe.studies.scoliosis.film_fit import FilmFit, fit_alike
-from spinepipe.studies.scoliosis.fit_population import fit_population, weights
+from spinepipe.studies.scoliosis.films import weights
+from spinepipe.studies.scoliosis.fit_population import fit_population
 from spinepipe.studies.scoliosis.personal import Patient, patient_of, region_optimum
 from spinepipe.studies.scoliosis.population import Population
 from spinepipe.studies.scoliosis.settings import Scoliosis

@@ -382,3 +382,9 @@ def film_sd(reading_mm: float, reading_deg: float, model_mm: float, model_deg: f
     units = np.array([MM_PER_M, MM_PER_M, DEG_PER_RAD])
     read = np.sqrt(READINGS_OF_A_CHANGE) * np.array([reading_mm, reading_mm, reading_deg]) / units
     return FilmSd(np.hypot(read, np.array([model_mm, model_mm, model_deg]) / units), read)
+
+
+def weights(settings: Scoliosis, cohort: Cohort) -> FilmSd:
+    """With which films are weighed; those of which nothing tells how they were read are exact."""
+    _, tilt, own = np.nan_to_num(reading_noise(settings, cohort)).tolist()
+    return film_sd(own, tilt, settings.model_sd_mm, settings.model_sd_deg)

@@ -22,7 +22,7 @@ from spinepipe.studies.scoliosis.film_fit import (
     FilmInformation,
     fit_alike,
 )
-from spinepipe.studies.scoliosis.films import FilmSd, film_sd, reading_noise
+from spinepipe.studies.scoliosis.films import FilmSd, weights
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.population import (
     Population,
@@ -53,12 +53,6 @@ def run(root: str, study: str, output: str) -> None:
     found = fit_population(settings, cohort, sd, progress)
     rows = population_rows(found, cohort.joint_names, sd)
     write(from_rows(POPULATION, list(rows)), output, provenance("population", settings, cohort))
-
-
-def weights(settings: Scoliosis, cohort: Cohort) -> FilmSd:
-    """With which films are weighed; those of which nothing tells how they were read are exact."""
-    _, tilt, own = np.nan_to_num(reading_noise(settings, cohort)).tolist()
-    return film_sd(own, tilt, settings.model_sd_mm, settings.model_sd_deg)
 
 
 def fit_population(

@@ -16,7 +16,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.model import SpineModel
-from spinepipe.studies.scoliosis.fit_population import weights
+from spinepipe.studies.scoliosis.films import weights
 from spinepipe.studies.scoliosis.fixed_end_spine import FixedEndSpine
 from spinepipe.studies.scoliosis.personal import ERRORS, Patient, model_of_law, patient_of
 from spinepipe.studies.scoliosis.pulled import pull_of, pulled_spine, under_pull

@@ -21,8 +21,8 @@ from spinepipe.studies.scoliosis.film_fit import (
     laws_of,
 )
 from spinepipe.studies.scoliosis.film_regions import by_ratio, region
-from spinepipe.studies.scoliosis.films import LEFT, RIGHT, FilmSd, film_sd
-from spinepipe.studies.scoliosis.fit_population import fit_population, weights
+from spinepipe.studies.scoliosis.films import LEFT, RIGHT, FilmSd, film_sd, weights
+from spinepipe.studies.scoliosis.fit_population import fit_population
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.personalise import rows_of
 from spinepipe.studies.scoliosis.population import population_rows, usual_population
