@@ -36,9 +36,8 @@ from spinepipe.studies.trunk_loads.persons import (
 )
 from spinepipe.studies.trunk_loads.postures import between, shares
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, level_rows, path_rows
-from spinepipe.studies.trunk_loads.sampling import values_at
+from spinepipe.studies.trunk_loads.sampling import censored_quantile, values_at
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.spread import LEAST_SAMPLES, MOST_FAILED
 from spinepipe.studies.trunk_loads.tables import LIFT_BANDS, LIFT_FRAMES, LIFT_LOADS, LIFT_PATHS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
@@ -235,11 +234,8 @@ def band_rows(times: Array, compression: Array, held: Array) -> Iterator[Row]:
     for k, time in enumerate(times.tolist()):
         good = compression[held[:, k], k]
         lost = len(held) - len(good)
-        enough = len(good) >= LEAST_SAMPLES and lost <= MOST_FAILED * len(held)
         for level, name in enumerate(LEVELS):
-            ends = (
-                np.quantile(good[:, level], [0.025, 0.5, 0.975]).tolist() if enough else [None] * 3
-            )
+            ends = [censored_quantile(good[:, level], lost, p) for p in (0.025, 0.5, 0.975)]
             yield {
                 "time_s": time,
                 "level": name,

@@ -151,18 +151,18 @@ def test_uncertain_lean_turns_bodies_and_no_load() -> None:
     assert leant.pressure_pa == 3e3
 
 
-def test_bands_are_percentiles_of_persons_that_hold() -> None:
+def test_persons_that_do_not_hold_a_frame_count_beyond_its_upper_end() -> None:
     compression = np.zeros((100, 2, len(LEVELS)))
     compression[:, :, 1] = np.arange(100.0)[:, None]
     held = np.ones((100, 2), dtype=bool)
-    held[90:, 0] = False
-    held[:21, 1] = False  # too many to tell
+    held[98:, 0] = False
+    held[5:, 1] = False  # too few to tell
     found = pd.DataFrame(band_rows(np.array([0.0, 0.1]), compression, held))
-    first, second = (
-        found[(found["level"] == "L4L5") & (found["time_s"] == t)].iloc[0] for t in (0.0, 0.1)
-    )
-    assert (first["n_samples"], first["n_failed"]) == (90, 10)
-    assert (first["low"], first["high"]) == tuple(np.quantile(np.arange(90.0), [0.025, 0.975]))
+    own = found[found["level"] == "L4L5"].set_index("time_s")
+    first, second = own.loc[0.0], own.loc[0.1]
+    assert (first["n_samples"], first["n_failed"]) == (98, 2)
+    assert first["low"] == np.quantile(np.arange(100.0), 0.025)
+    assert first["high"] == pytest.approx(np.quantile(np.arange(100.0), 0.975))
     assert second[["low", "median", "high"]].isna().all()
 
 
