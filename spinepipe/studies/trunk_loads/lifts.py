@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
@@ -85,7 +86,7 @@ def rows_of(
 ) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
     asked, options = settings.motions, solver_options(settings)
-    frames = np.arange(0, len(motion.time_s), asked.every)
+    frames = np.arange(0, len(motion.time_s), asked.every, dtype=np.int64)
     tasks = tasks_of(motion, frames, 1e6 * asked.largest_stress_mpa)
     person, found = stands.person, dict[str, list[Row]]()
     outcomes = [
@@ -111,7 +112,10 @@ def rows_of(
 
 
 def tasks_of(
-    motion: RecordedMotion, frames: Array, stress_pa: float, values: Values | None = None
+    motion: RecordedMotion,
+    frames: NDArray[np.int64],
+    stress_pa: float,
+    values: Values | None = None,
 ) -> list[Task]:
     """Frames of a motion as tasks.
 
@@ -173,7 +177,7 @@ def _load_rows(outcome: TaskOutcome) -> Iterator[Row]:
 
 
 def _frame_rows(
-    motion: RecordedMotion, frames: Array, outcomes: Sequence[TaskOutcome]
+    motion: RecordedMotion, frames: NDArray[np.int64], outcomes: Sequence[TaskOutcome]
 ) -> Iterator[Row]:
     names = motion.loads.names
     lifted = names.index(LIFTED) if LIFTED in names else None
@@ -188,15 +192,16 @@ def _frame_rows(
 
 def _compression(solved: SolvedTask | None) -> float:
     """N, of L4L5; of frames that are not held nought."""
-    held = solved is not None and solved.status in HELD
-    return float(solved.compression[L4L5]) if held else 0.0
+    if solved is None or solved.status not in HELD:
+        return 0.0
+    return float(solved.compression[L4L5])
 
 
 def _samples(
     settings: TrunkLoads,
     stands: UprightPerson,
     motion: RecordedMotion,
-    frames: Array,
+    frames: NDArray[np.int64],
     progress: Progress,
 ) -> tuple[Array, Array]:
     """(S, N, 7) N compression of persons drawn by the uncertain inputs, and (S, N) whether held."""
