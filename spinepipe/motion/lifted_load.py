@@ -1,7 +1,7 @@
 """What hands lift from the floor: where it is, and how much of its weight they bear by now.
 
-On a plate it is told all along: as much as the plate bears less than before. Else it is told by
-height: hands bear all of it from where it has risen by `RISEN_M`, and nothing before.
+On a plate it is told all along: as much as the plate bears less than before, and so is its weight.
+Else it is told by height: hands bear all of it once it has risen by `RISEN_M`, and nothing before.
 """
 
 from collections.abc import Mapping
@@ -55,8 +55,8 @@ class LiftedLoad:
         return int(np.argmax(half)) if half.any() and not half[0] else None
 
 
-def borne_by_plates(kg: float, plates: Mapping[str, Array]) -> tuple[str, Array] | None:
-    """Which plate the load stood on, and the share (F,) that hands bear by it.
+def borne_by_plates(kg: float, plates: Mapping[str, Array]) -> tuple[float, Array] | None:
+    """What the load weighs on the plate it stood on, kg, and the share (F,) that hands bear of it.
 
     Parameters
     ----------
@@ -66,12 +66,13 @@ def borne_by_plates(kg: float, plates: Mapping[str, Array]) -> tuple[str, Array]
     -------
     None where no plate bears less by its weight at the end than at the beginning.
     """
-    weight = kg * float(np.linalg.norm(STANDARD_GRAVITY))
-    for name, upwards in plates.items():
+    gravity = float(np.linalg.norm(STANDARD_GRAVITY))
+    for upwards in plates.values():
         part = max(1, len(upwards) // TENTH)
         before, after = float(np.median(upwards[:part])), float(np.median(upwards[-part:]))
-        if abs(before - after - weight) <= SAME_WEIGHT * weight:
-            return name, np.clip((before - upwards) / (before - after), 0.0, 1.0)
+        weighed = (before - after) / gravity
+        if abs(weighed - kg) <= SAME_WEIGHT * kg:
+            return weighed, np.clip((before - upwards) / (before - after), 0.0, 1.0)
     return None
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spinepipe.effects.contract import Array
+from spinepipe.facts import several
 from spinepipe.motion.body_segments import RigidPart, cylinder
 from spinepipe.motion.skeleton import BODIES, JOINTS
 from spinepipe.muscles.masses import masses_of
@@ -19,8 +20,11 @@ from spinepipe.muscles.regressions import packaged
 from spinepipe.muscles.scaling import scale_trunk
 from spinepipe.muscles.subject import REFERENCE, Subject
 from spinepipe.muscles.trunk import LEVELS, SLICES, Mass, Trunk, body_of
-from spinepipe.muscles.upright import USUAL_START_DEG
 from spinepipe.units import MM_PER_M
+
+UPRIGHT_DEG = several(__name__, "upright_extension")[""]
+"""How S1 to T11 are turned in extension from the source's pose, in a man who stands: what the
+search of `spinepipe.muscles.upright` finds, which muscles and joints have a say in."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +44,10 @@ class StandingSpine:
 
 
 def usual_spine(subject: Subject, source: Trunk) -> StandingSpine:
-    """The spine of a person of whom sex, age, height and mass are known, of a reference trunk.
-
-    The person stands where the search for an upright posture begins, in which muscles have a say.
-    """
+    """The spine of a person of whom sex, age, height and mass are known, of a reference trunk."""
     trunk = scale_trunk(source, subject, REFERENCE, packaged())
-    upright = np.zeros((len(USUAL_START_DEG), 3))
-    upright[:, 0] = np.deg2rad(USUAL_START_DEG)
+    upright = np.zeros((len(UPRIGHT_DEG), 3))
+    upright[:, 0] = np.deg2rad(UPRIGHT_DEG)
     chain = JointCentres.of(trunk, BEHIND_MM / MM_PER_M)
     return standing_spine(subject, trunk, chain, upright, masses_of(trunk, subject))
 

@@ -18,10 +18,6 @@ from spinepipe.muscles.person import Person
 from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES
 from spinepipe.units import STANDARD_GRAVITY
 
-USUAL_START_DEG = (-2.5, -2.5, -0.5, 1.5, 2.5, 2.5, 1.0, -1.5)
-"""Extension of S1 to T11 from the source's pose, about which the search goes unless told otherwise:
-half of what whole segments as stiff as those of Gould 2024b stand in."""
-
 MOST_ROUNDS = 30
 BEGINNINGS = 12
 """Places where the search begins: the start, and others drawn from the range, always the same."""

@@ -81,11 +81,11 @@ def _upright(look: LoadedTrial) -> InputProblem | None:
     if lean <= limit:
         return None
     found = f"'{look.axes}', and the trunk is {lean:.0f} deg off upright as it begins"
-    remedy = f"check which axis of the file is up; did you mean '{_better_axes(look.axes, turn)}'?"
+    remedy = f"check which axis of the file is up; did you mean '{better_axes(look.axes, turn)}'?"
     return look.in_table("axes", found, f"at most {limit:g} deg", remedy)
 
 
-def _better_axes(axes: str, turn: Array) -> str:
+def better_axes(axes: str, turn: Array) -> str:
     """Axes with which the markers would stand as in the set, to the nearest right angle."""
     # a signed permutation: the largest entry left, then none of its row and column
     nearest = np.zeros((3, 3))

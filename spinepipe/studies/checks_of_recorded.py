@@ -12,7 +12,7 @@ from spinepipe.motion.reading import DEFAULT_AXES
 from spinepipe.motion.skeleton import BODIES, PELVIS, MarkerSet, MarkerTrial
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.checks_of_markers import LoadedTrial
-from spinepipe.studies.checks_of_motion import motion_problems
+from spinepipe.studies.checks_of_motion import better_axes, motion_problems
 from spinepipe.studies.recorded_motion import HANDS, lifted_load, places_of, smooth_places
 from spinepipe.studies.recordings import (
     BOX,
@@ -24,10 +24,13 @@ from spinepipe.studies.recordings import (
     trial_rows,
 )
 from spinepipe.studies.subjects import subject_of
-from spinepipe.units import MM_PER_M
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 SEGMENTS = (("SHO", "ELB"), ("ELB", "WRA"), ("ELB", "WRB"), ("WRA", "FIN"))
 """Pairs of markers of an arm that keep their distance."""
+
+ASKEW_DEG = 15.0
+"""How far to a side a person may look who bends straight forwards: a choice."""
 
 STRETCHED_M = 0.05
 """By how much skin may change that distance: a choice; wrist and knuckle are 80 mm apart."""
@@ -49,7 +52,8 @@ def recorded_problems(cohort: Cohort, cutoff_hz: float) -> Iterator[InputProblem
         for row in sorted(rows, key=lambda row: row["trial"] != still):
             try:
                 _, places = places_of(row, cohort)
-                found = list(motion_problems(_loaded(row, cohort, specimen)))
+                look = _loaded(row, cohort, specimen)
+                found = [*motion_problems(look)] or [*_facing(look)]
                 stance = stance or {name: at.mean(axis=0) for name, at in places.items()}
                 found = found or list(_arms(f"{cohort.name}/{row['file']}", stance, places))
                 if not found and row["kind"] != STANCE:
@@ -83,6 +87,17 @@ def _loaded(row: Row, cohort: Cohort, specimen: str) -> LoadedTrial:
     axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
     files = f"{cohort.name}/{row['file']}", f"{cohort.name}/{TRIALS.file}"
     return LoadedTrial(trial, markers, at, axes, *files, row["line"], read.first, "Plug-in-Gait")
+
+
+def _facing(look: LoadedTrial) -> Iterator[InputProblem]:
+    """A person who begins by looking elsewhere than forwards: what turns is told in ground axes."""
+    rotations, told = look.turned
+    turn = rotations[int(np.argmax(told))]
+    left = DEG_PER_RAD * float(np.arctan2(-turn[2, 0], turn[0, 0]))
+    if told.any() and abs(left) > ASKEW_DEG:
+        found = f"'{look.axes}', and the person looks {left:.0f} deg to the left of forwards"
+        remedy = f"did you mean '{better_axes(look.axes, turn)}'? else turn the recording"
+        yield look.in_table("axes", found, f"at most {ASKEW_DEG:g} deg", remedy)
 
 
 def _arms(

@@ -139,7 +139,7 @@ def lifted_load(
             for name, one in plates.groupby("plate", sort=False)
         }
         told = borne_by_plates(kg, upwards)
-        borne = borne if told is None else told[1]
+        kg, borne = (kg, borne) if told is None else told
     return LiftedLoad(kg, at, borne)
 
 

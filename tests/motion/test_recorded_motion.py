@@ -159,7 +159,7 @@ def test_joints_below_carry_what_joints_above_do_and_more() -> None:
     motion = recorded_motion(lifts.lifts(), "s01", "lift2", lifts.spine())
     forces, moments = _net(motion)
     kg = -motion.still.forces[-1, :, 1] / G
-    assert kg[-1] == pytest.approx(15.0, abs=0.1)
+    assert kg[-1] == pytest.approx(14.86, abs=0.02)  # as the plate weighs it
     assert 0.47 * 81.68 < kg[:-1].sum() < 0.52 * 81.68
     k = JOINTS.index("L4L5")
     own = motion.loads.carriers.index("L5")
@@ -177,7 +177,7 @@ def test_hands_bear_what_a_plate_bears_no_more() -> None:
         plates = {"feet": 800.0 + 15.0 * G * risen, "load": stood - 15.0 * G * risen}
         told = borne_by_plates(15.0, plates)
         assert told is not None
-        assert told[0] == "load"
+        assert told[0] == pytest.approx(15.0)
         assert np.allclose(told[1], risen)
     assert borne_by_plates(30.0, plates) is None
     heights = 0.1 + np.r_[np.zeros(40), 0.01 * np.arange(60)]

@@ -17,6 +17,7 @@ from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.points import marker_places
 from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
+from spinepipe.motion.recorded_motion import RIGID_FROM
 from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.skeleton import BODIES, MarkerSet
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource, origin_of_myo_sim
@@ -30,7 +31,7 @@ from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_pr
 from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in, trial_of
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
 from spinepipe.studies.tracking.trials import MARKER_SET, PASSIVE, RATIOS, source_kinds
-from spinepipe.units import COORDINATES
+from spinepipe.units import COORDINATES, ROTATIONS
 
 NEEDED = (SUBJECTS, TRIALS, MARKER_SET)
 """Tables that a cohort must have."""
@@ -130,6 +131,10 @@ def _lifts(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[
     if study.ratios not in sets:
         found, remedy = f"'{study.ratios}'", f"name one, or add it to {cohort.name}/{RATIOS.file}"
         yield InputProblem(*document.place_of("ratios"), found, one_of(sets), remedy)
+    elif not sets[study.ratios][:RIGID_FROM].sum(axis=0).all():
+        found = f"'{study.ratios}', which leaves out a rotation"
+        allowed = f"shares of {', '.join(ROTATIONS)} below {BODIES[RIGID_FROM]}"
+        yield InputProblem(*document.place_of("ratios"), found, allowed, "name another set")
 
 
 def _source(document: YamlDocument) -> Iterator[InputProblem]:

@@ -1,7 +1,7 @@
 """A study of measured lifts: moments beside measured ones, and inputs that are wrong.
 
 Goals were set before: with accelerations 10 N m (RMS), before lift-off 8, without accelerations 15.
-Peaks were to be within 5 %; they are within 6 (docs/studies/tracking.md says what they hang on).
+Peaks are within 5 %.
 
 Catches a moment that moves away from the measured one, and a recording that is read as what it is
 not.
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import lifts
+import numpy as np
 import pandas as pd
 import pytest
 from sweeps import sweep
@@ -21,14 +22,17 @@ from spinepipe.cohort import Cohort
 from spinepipe.motion.joint_tables import USUAL_SHARES
 from spinepipe.motion.reading import read_motion
 from spinepipe.motion.smoothing import USUAL_CUTOFF_HZ
+from spinepipe.motion.standing_spine import UPRIGHT_DEG
+from spinepipe.muscles.myo_sim import source_of_myo_sim
 from spinepipe.muscles.pose import BEHIND_MM
-from spinepipe.muscles.upright import USUAL_START_DEG
+from spinepipe.muscles.regressions import packaged
 from spinepipe.problems import InputError
 from spinepipe.studies.checks_of_recorded import recorded_problems
 from spinepipe.studies.recorded_motion import recorded_motion
 from spinepipe.studies.registry import every_form
 from spinepipe.studies.tracking.joint_moments import table_rows
 from spinepipe.studies.tracking.settings import Tracking
+from spinepipe.studies.trunk_loads.persons import UprightPerson
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
 STUDY = Tracking(study="lifts", kind="tracking", cohort="stoop_lift", marker_set="plug_in_gait")
@@ -47,7 +51,7 @@ def test_moments_are_those_that_were_measured_from_the_feet(agreement: pd.DataFr
     assert list(feet.loc["moving", "trial"]) == list(lifts.TRIALS)
     assert feet.loc["moving", "rmse_nm"].max() < 10.0
     assert feet.loc["moving", "before_nm"].max() < 8.0
-    assert feet.loc["moving", "peak_percent"].abs().max() < 6.0
+    assert feet.loc["moving", "peak_percent"].abs().max() < 5.0
     assert feet.loc["still", "rmse_nm"].max() < 15.0
     assert feet.loc["still", "peak_percent"].between(-15.0, -5.0).all()
     assert feet[["right_bending_nm", "left_rotation_nm"]].max(axis=None) < 10.0
@@ -61,9 +65,14 @@ def test_hands_know_of_the_box_from_lift_off_on(agreement: pd.DataFrame) -> None
 
 def test_defaults_of_settings_are_those_of_the_library() -> None:
     assert (STUDY.cutoff_hz, STUDY.ratios) == (USUAL_CUTOFF_HZ, USUAL_SHARES)
-    fields = TrunkLoads.model_fields
-    assert fields["upright_start_deg"].default == USUAL_START_DEG
-    assert fields["passive"].default.joints_behind_mm == BEHIND_MM
+    assert TrunkLoads.model_fields["passive"].default.joints_behind_mm == BEHIND_MM
+
+
+def test_a_man_stands_as_the_search_of_trunk_loads_finds() -> None:
+    settings = TrunkLoads(study="a", kind="trunk_loads", cohort="a")
+    source, sizes = source_of_myo_sim().trunk, packaged()
+    found = np.rad2deg(UprightPerson.of(settings, source, lifts.MAN, sizes).upright.angles)
+    assert np.abs(found - UPRIGHT_DEG).mean() < 1.0
 
 
 def edited(folder: Path, edit: Callable[[Path], None]) -> Cohort:
@@ -100,6 +109,14 @@ def renamed(file: str, names: dict[str, str]) -> Callable[[Path], None]:
     return edit
 
 
+def axes(text: str) -> Callable[[Path], None]:
+    def edit(folder: Path) -> None:
+        trials = pd.read_csv(folder / "trials.csv")
+        trials.assign(axes=text).to_csv(folder / "trials.csv", index=False)
+
+    return edit
+
+
 def exchanged(one: str, other: str) -> dict[str, str]:
     return {one: other, other: one}
 
@@ -123,6 +140,8 @@ def another_day(rows: pd.DataFrame) -> None:
         (box(late), "box.csv -0.50 s would fit"),
         (box(another_day), "put it on the clock of the markers"),
         (renamed("stance", exchanged("LASI", "RASI")), "LASI and RASI"),
+        (axes("-x z y"), "did you mean 'x z -y'?"),
+        (axes("z x y"), "off upright as it begins"),
         (renamed("lift1", exchanged("C7", "STRN")), "exchange the two names"),
         (renamed("lift1", exchanged("LELB", "LWRA")), "mm in the stance"),
         (renamed("lift2", {"T10": "T11"}), "T10: found no such marker"),

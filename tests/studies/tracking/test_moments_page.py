@@ -26,9 +26,9 @@ def made() -> StudyTables:
     return StudyTables({shape.name: frame(shape, part) for shape, part in tables})
 
 
-def near() -> StudyTables:
-    """As if moments were as measured."""
-    beside = made()["moment_agreement"].assign(rmse_nm=2.0, peak_percent=1.0)
+def far() -> StudyTables:
+    """As if moments were not those that were measured."""
+    beside = made()["moment_agreement"].assign(rmse_nm=20.0, peak_percent=11.0)
     return StudyTables(made() | {"moment_agreement": beside})
 
 
@@ -49,13 +49,13 @@ def test_sentences_follow_the_numbers() -> None:
         name: verdicts(conclusions_of_moments(STUDY, tables))
         for name, tables in (
             ("made", made()),
-            ("near", near()),
+            ("far", far()),
             ("alone", alone()),
             ("nothing", nothing()),
         )
     }
-    assert {("moment", "differs"), ("compared", "check"), ("other", "told")} <= found["made"]
-    assert {("moment", "agrees"), ("compared", "ok")} <= found["near"]
+    assert {("moment", "agrees"), ("compared", "ok"), ("other", "told")} <= found["made"]
+    assert {("moment", "differs"), ("compared", "check")} <= found["far"]
     assert {("moment", "alone"), ("compared", "check_alone")} <= found["alone"]
     assert found["nothing"] == {("moment", "none")}
     told_of = {"course", "peak", "before", "quasi_static", "lifted"}
@@ -63,7 +63,7 @@ def test_sentences_follow_the_numbers() -> None:
 
 
 def test_pages_and_figures_are_sound() -> None:
-    for tables in (made(), near(), alone(), nothing()):
+    for tables in (made(), far(), alone(), nothing()):
         assert list(faults_of_told(said(tables))) == []
         assert list(faults_of_chart(moments(STUDY, lifts.lifts(), tables))) == []
         results = ResultTables(tables)
