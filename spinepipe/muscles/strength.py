@@ -7,6 +7,7 @@ keeps its force meanwhile: it is no stiffer because muscles contract harder.
 """
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import linprog
@@ -27,9 +28,12 @@ LOWEST_PA, HIGHEST_PA = _PEOPLE["range"]
 
 _EXTENSION = 2
 
-_ABOVE_LEAST, _STEP, _NEAR = 1.005, 1.01, 1.02
+_ABOVE_LEAST, _STEP, _NEAR = 1.01, 1.01, 1.03
 """Stress that is tried next over the least one of this posture; at least so much over one that did
 not do; and how near to it one that does is near enough."""
+
+_FAR = 2.0
+"""Times what trunks have: no other posture makes up for so much."""
 
 _MOST_SOLVES = 8
 
@@ -37,6 +41,8 @@ _NO_FINITE_PA = 1e9
 """A thousand times what muscles have: what rounding makes of lever arms of nought."""
 
 _MPA = 1e-6
+
+Least = Literal["sought", "of_posture", "untold"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +55,8 @@ class HeldTask:
     asked : at the stress that was asked for.
     person, task : at the stress of `solved`, for whatever is asked of them further.
     least_pa : least largest active stress that holds it, Pa, in the posture of `solved`; of a task
-        that is not held in the last one that was tried. None: no finite stress does.
+        that is not held in the last one that was tried. None: no finite stress does, or it is
+        not told.
     short_of, short_at : what a task that is not held lacks, arms or strength, and the joint where
         most is lacking; else None.
     solves : how often the task was solved.
@@ -69,15 +76,15 @@ def hold_task(
     person: Person,
     task: Task,
     options: SolverOptions,
-    seek_least: bool = False,
+    least: Least = "of_posture",
     nearby: SolvedTask | None = None,
 ) -> HeldTask:
     """A task with the forces that hold it, at the stress asked for or the least above that does.
 
     Parameters
     ----------
-    seek_least : whether the least stress is sought where less than what was asked for does; else
-        it is that of the posture that was found.
+    least : whether the least stress is sought where less than what was asked for does, or told of
+        the posture that was found, or not told there.
     nearby : a task much like it, such as the frame before, whose forces shorten the way.
 
     Raises
@@ -86,37 +93,44 @@ def hold_task(
         For a load that the arms do not reach.
     """
     asked = solve_task(person, task, options, nearby=nearby)
-    now = HeldTask(asked, asked, person, task, least_stress_pa(asked))
+    now = HeldTask(asked, asked, person, task, None)
     # with L5S1 balanced alone, what other joints ask for is not to be made
-    if options.lowest_alone or (_is_held(now, options) and not seek_least):
+    done = options.lowest_alone or (_is_held(now, options) and least != "sought")
+    if done and least == "untold":
+        return now
+    now = replace(now, least_pa=_least_pa(asked, options))
+    if done:
         return now
     best, too_little, solves = None, 0.0, 1
     while solves < _MOST_SOLVES:
-        stress = HIGHEST_PA if now.least_pa is None else _ABOVE_LEAST * now.least_pa
+        stress = np.inf if now.least_pa is None else _ABOVE_LEAST * now.least_pa
         if _is_held(now, options):
             best = now
         else:
             too_little = now.task.stress_pa
+            if stress > _FAR * HIGHEST_PA:
+                break
         stress = min(max(stress, _STEP * too_little), max(HIGHEST_PA, task.stress_pa))
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
             break
         now, solves = _at(person, task, stress, options, now), solves + 1
     if best is None:
         return replace(_not_held(now, person, task), solves=solves)
-    least = min(best.task.stress_pa, best.least_pa or np.inf)
+    takes = min(best.task.stress_pa, best.least_pa or np.inf)
     if best.task.stress_pa <= task.stress_pa:
-        return HeldTask(asked, asked, person, task, least, solves=solves)
+        return HeldTask(asked, asked, person, task, takes, solves=solves)
     solved = above_asked(best.solved, task, best.task)
-    return replace(best, solved=solved, least_pa=least, solves=solves)
+    return replace(best, solved=solved, least_pa=takes, solves=solves)
 
 
 def above_asked(solved: SolvedTask, asked: Task, held: Task) -> SolvedTask:
     """Forces of a task held at more stress than was asked for, with a status that says so."""
     if solved.status is not Balanced.CONVERGED or held.stress_pa <= asked.stress_pa:
         return solved
-    message = (
+    stress = (
         f"at {_MPA * held.stress_pa:.2f} MPa of muscle stress, {_MPA * asked.stress_pa:g} allowed"
     )
+    message = "; ".join(part for part in (stress, solved.message) if part)
     return replace(solved, status=Balanced.CONVERGED_ABOVE, message=message)
 
 
@@ -129,13 +143,13 @@ def _at(
     who = replace(person, passive=replace(person.passive, factor=factor))
     harder = replace(task, stress_pa=stress_pa)
     solved = solve_task(who, harder, options, nearby=before.solved)
-    return HeldTask(solved, before.asked, who, harder, least_stress_pa(solved))
+    return HeldTask(solved, before.asked, who, harder, _least_pa(solved, options))
 
 
 def _not_held(last: HeldTask, person: Person, task: Task) -> HeldTask:
     """A task that all the stress of trunks does not hold: as it was asked for, and why."""
     asked, demand = last.asked, last.solved.demand
-    if asked.status is Balanced.CONVERGED:  # but for what may be left over
+    if last.least_pa is not None and last.least_pa <= HIGHEST_PA:  # rounds that found no end
         return HeldTask(asked, asked, person, task, last.least_pa)
     if last.least_pa is None:
         freely = least_slack_forces(replace(demand, most=np.full(len(demand.most), np.inf)))
@@ -149,18 +163,23 @@ def _not_held(last: HeldTask, person: Person, task: Task) -> HeldTask:
             f"takes {_MPA * last.least_pa:.3g} MPa of muscle stress, most of all for {at}, "
             f"and trunks have {_MPA * HIGHEST_PA:g} at most"
         )
-    solved = replace(asked, message="; ".join(part for part in (asked.message, why) if part))
+    # where no forces hold, those that leave least over may go to and fro
+    message = f"{asked.message}; {why}"
+    solved = replace(asked, status=Balanced.BEYOND_STRENGTH, message=message)
     return HeldTask(solved, asked, person, task, last.least_pa, short_of, at)
 
 
 def _is_held(one: HeldTask, options: SolverOptions) -> bool:
-    """Whether muscles make all moments, but for what counts as balanced."""
-    return float(np.abs(one.solved.found.slack).max()) <= options.residual_nm
+    """Whether muscles make all moments, but for what may be left over."""
+    return float(np.abs(one.solved.found.slack).max()) <= options.slack_nm
 
 
-def least_stress_pa(solved: SolvedTask) -> float | None:
-    """Least largest active stress, Pa, that holds a task where the spine is; None: none does."""
-    return stress_needed(solved.demand, solved.stretched)
+def _least_pa(solved: SolvedTask, options: SolverOptions) -> float | None:
+    """Least stress, Pa, that holds a task where the spine is, if need be with what is left over."""
+    demand, slack = solved.demand, solved.found.slack
+    if np.abs(slack).max() <= options.slack_nm:
+        demand = replace(demand, required=demand.required - slack)
+    return stress_needed(demand, solved.stretched)
 
 
 def stress_needed(demand: Demand, stretched: Array) -> float | None:

@@ -17,6 +17,7 @@ from spinepipe.muscles.strength import (
     HIGHEST_PA,
     LOWEST_PA,
     MEAN_PA,
+    Least,
     capacity_left,
     hold_task,
     load_factor,
@@ -28,6 +29,7 @@ from spinepipe.studies.trunk_loads.persons import solver_options
 
 JUST = 1e-5
 ASKED = solver_options(SETTINGS)
+LEAST: tuple[Least, ...] = ("untold", "of_posture", "sought")
 
 
 def can_be_held(held: SolvedTask, required: np.ndarray) -> bool:
@@ -142,7 +144,7 @@ def test_a_task_beyond_the_stress_asked_for_is_held_at_the_least_that_does() -> 
     assert f"at {1e-6 * held.task.stress_pa:.2f} MPa of muscle stress" in held.solved.message
     assert held.short_of is None
     assert held.least_pa is not None
-    assert PA < held.least_pa <= held.task.stress_pa < 1.02 * held.least_pa
+    assert PA < held.least_pa <= held.task.stress_pa < 1.03 * held.least_pa
     assert held.solves <= 3
     # no forces at a little less, where the spine is
     demand, passive = held.solved.demand, held.solved.stretched
@@ -157,9 +159,10 @@ def test_a_task_beyond_the_stress_asked_for_is_held_at_the_least_that_does() -> 
 
 def test_least_stress_below_what_is_asked_for_changes_no_force() -> None:
     person, task = made_up(), tasks()["standing"]
-    quick, sought = (hold_task(person, task, ASKED, seek) for seek in (False, True))
+    untold, quick, sought = (hold_task(person, task, ASKED, how) for how in LEAST)
     assert quick.solved.status is sought.solved.status is Balanced.CONVERGED
     np.testing.assert_array_equal(quick.solved.found.forces, sought.solved.found.forces)
+    assert untold.least_pa is None
     assert sought.least_pa is not None
     assert quick.least_pa == pytest.approx(sought.least_pa, rel=0.1)
     again = hold_task(person, replace(task, stress_pa=1.02 * sought.least_pa), ASKED)

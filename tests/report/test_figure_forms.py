@@ -94,6 +94,9 @@ def test_symbols_and_intervals_stand_where_the_frame_has_them() -> None:
     assert [0.5, 2.0] in [list(one) for one in ends]
     assert len(ends) == 4, "none where no end is known"
     assert min(one[0] for one in ends) < 0.5, "an open end reaches the edge"
+    above = Rows(frame=rows().assign(low=100.0, high=[110.0, np.nan, 120.0] * 2), looks=TWO)
+    ends = [s[:, 0] for part in drawn(above).collections for s in part.get_segments()]
+    assert max(one[1] for one in ends) > 120.0, "the edge of all, not of what was drawn before"
 
 
 def test_a_hollow_symbol_is_not_to_be_trusted() -> None:

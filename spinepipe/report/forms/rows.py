@@ -88,6 +88,11 @@ class Rows(Panel):
             axes.set_xscale("log")
         if self.x_limits:
             axes.set_xlim(*self.x_limits)
+        else:  # open ends go to the edge, which lies beyond all symbols
+            columns = self.frame.columns.intersection(["value", "low", "high"])
+            numbers = self.frame[columns].to_numpy(float)
+            axes.update_datalim([(x, 0.0) for x in numbers[np.isfinite(numbers)]])
+            axes.autoscale_view(scaley=False)
         for number, one in enumerate(series):
             rows = self.frame if one == "" else self.frame[self.frame["series"] == one]
             look = self.looks.get(one, SEVERAL[number % len(SEVERAL)])
@@ -110,7 +115,7 @@ class Rows(Panel):
         if self.log:
             log_ticks(axes.xaxis, *axes.get_xlim())
         else:  # as many ticks whatever the width, which the layout is still to find
-            axes.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+            axes.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
         low, high = axes.get_xlim()
         if not self.log and low < 0.0 < high:
             axes.axvline(0.0, color=COLORS["soft"], lw=0.8, zorder=1)

@@ -69,7 +69,7 @@ def pressures(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
         keys.insert(0, Key(MEASURED, "measured"))
         keys.append(Key(MEASURED, "measured, not confirmed in print", hollow=True))
     held = "thick line: range over bodies that hold the task"
-    caption = f"{short(plain(body))}; thin line: 95 % of samples that hold the task; {held}."
+    caption = f"{short(plain(body))}; thin line: 95 % of samples, to the edge where open; {held}."
     return Chart(title, panels, capital(caption), keys)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from spinepipe.effects.contract import Array
 from spinepipe.facts import number
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.trunk import BODIES
@@ -32,6 +33,8 @@ REACH_M = 0.9
 """From between the shoulders to the hand: half their breadth and an arm, of a tall person."""
 
 LARGEST_STRESS_MPA = 3.0
+
+_TRUNK = turn("trunk", "extension")
 
 
 @dataclass(frozen=True)
@@ -142,14 +145,42 @@ def _place_of_hands(
         remedy = "is it in m? multiply by 1000"
         yield row.problem(HANDS[int(np.abs(place).argmax())], found, "mm", remedy)
     elif tallest_m is not None:
-        leaning = rotation_zxy(*np.deg2rad(turned_deg(row.cells, means)[-1]).tolist())
-        shoulders = leaning @ np.array([0.0, SHOULDERS_OF_HEIGHT * tallest_m, 0.0])
-        away = float(np.linalg.norm(place / MM_PER_M - shoulders))
-        if away > REACH_M:
-            found = f"hands {away:.2f} m from the shoulders of the tallest, {tallest_m:g} m"
-            remedy = "correct it: from the centre of L5S1, forwards, up and to the right, mm"
-            farthest = HANDS[int(np.abs(place / MM_PER_M - shoulders).argmax())]
+        apart = _from_shoulders(row.cells, place, means, tallest_m)
+        beyond_mm = MM_PER_M * (float(np.linalg.norm(apart)) - REACH_M)
+        if beyond_mm > 0.0:
+            found = (
+                f"hands {beyond_mm:.0f} mm beyond the reach of the tallest, {tallest_m:g} m: "
+                f"{np.linalg.norm(apart):.2f} m from the shoulders"
+            )
+            nearer = f"bring them {beyond_mm:.0f} mm nearer; they count from the centre of L5S1"
+            bent = _posture_that_reaches(row.cells, place, means, tallest_m)
+            remedy = nearer if bent is None else f"write {_TRUNK} {bent:g}, or {nearer}"
+            farthest = HANDS[int(np.abs(apart).argmax())]
             yield row.problem(farthest, found, f"{REACH_M:g} m at most, an arm's reach", remedy)
+
+
+def _from_shoulders(cells: Row, place: Array, means: TrunkAngle, tallest_m: float) -> Array:
+    """(3,) m from between the shoulders to hands at (3,) mm from L5S1."""
+    leaning = rotation_zxy(*np.deg2rad(turned_deg(cells, means)[-1]).tolist())
+    shoulders = leaning @ np.array([0.0, SHOULDERS_OF_HEIGHT * tallest_m, 0.0])
+    found: Array = place / MM_PER_M - shoulders
+    return found
+
+
+def _posture_that_reaches(
+    cells: Row, place: Array, means: TrunkAngle, tallest_m: float
+) -> float | None:
+    """Extension of the trunk, whole degrees, nearest to that of a task, in which hands are within
+    reach; None where there is none, or every body's rotation is told."""
+    now = cells[_TRUNK]
+    if pd.isna(now):
+        return None
+    angles = np.arange(-np.floor(THORAX_DEG), MOST_EXTENSION_DEG)
+    for angle in sorted(angles.tolist(), key=lambda angle: abs(angle - float(now))):
+        apart = _from_shoulders({**cells, _TRUNK: angle}, place, means, tallest_m)
+        if np.linalg.norm(apart) <= REACH_M:
+            return float(angle)
+    return None
 
 
 def _push(row: _Row) -> Iterator[InputProblem]:

@@ -199,7 +199,7 @@ def _standing(tasks: pd.DataFrame, cohort: Cohort) -> Iterator[Conclusion]:
     values = {
         "share": Value(100.0 * float(relaxed["strength_used"].max()), "%", source="tasks"),
         "easy": Value(100.0 * EASY, "%"),
-        "low": Value(100.0 * LOW_TONE, "%", source="Cholewicki 1997, from memory"),
+        "low": Value(100.0 * LOW_TONE, "%", source="own estimate"),
         "tone": Value(100.0 * float(needed.max()) if len(needed.dropna()) else 0.0, "%"),
     }
     faults = {

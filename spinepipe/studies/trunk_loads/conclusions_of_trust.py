@@ -19,7 +19,7 @@ from spinepipe.studies.trunk_loads.selection import (
     sound,
 )
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.words import assumed, input_words, task_words
+from spinepipe.studies.trunk_loads.words import REFUSED, assumed, input_words, task_words
 
 TELLABLE_MPA = 0.1
 """Two series of one man's measurements differ by this (Wilke 1999 and 2001, load held close)."""
@@ -187,7 +187,8 @@ def _samples(tables: Tables) -> Iterator[Conclusion]:
     source = "intervals: n_samples, n_failed and n_above, over tasks"
     values = numbers_from(source, lost=lost, samples=drawn, above=above)
     values |= numbers_from("intervals", tasks=empty, open=opened - empty, fewest=LEAST_SAMPLES)
-    verdict = "stop" if empty else "check" if lost else "check_above" if above else "ok"
+    some = "check_open" if opened > empty else "check" if lost else "check_above" if above else "ok"
+    verdict = "stop" if empty else some
     yield Conclusion("samples", verdict, values | people_mpa())
 
 
@@ -197,21 +198,20 @@ def _samples(tables: Tables) -> Iterator[Conclusion]:
 def _held(tasks: pd.DataFrame) -> Conclusion:
     """Bodies and tasks that muscles hold, at what stress, and those that they do not, by cause."""
     n = {one.value: int((tasks["status"] == one.value).sum()) for one in Balanced}
-    arms = int((tasks["short_of"] == "arms").sum())
-    lost, reach = int((~sound(tasks)).sum()), n[Balanced.OUT_OF_REACH]
-    values = numbers_from(
-        "tasks: status and short_of",
-        pairs=len(tasks),
-        usual=n[Balanced.CONVERGED],
-        above=n[Balanced.CONVERGED_ABOVE],
-        lost=lost,
-        arms=arms,
-        weak=n[Balanced.BEYOND_STRENGTH] - arms,
-        reach=reach,
-        unsolved=lost - n[Balanced.BEYOND_STRENGTH] - reach,
+    above, beyond = n[Balanced.CONVERGED_ABOVE], n[Balanced.BEYOND_STRENGTH]
+    arms, lost = int((tasks["short_of"] == "arms").sum()), int((~sound(tasks)).sum())
+    refused = {"weak": beyond - arms, "arms": arms, "reach": n[Balanced.OUT_OF_REACH]}
+    refused["unsolved"] = lost - sum(refused.values())
+    source = "tasks: status and short_of"
+    values = numbers_from(source, pairs=len(tasks), usual=n[Balanced.CONVERGED], above=above)
+    values |= numbers_from(source, lost=lost, **refused)
+    why = listed(
+        REFUSED[cause].format("all" if many == lost else many)
+        for cause, many in refused.items()
+        if many
     )
-    verdict = "stop" if lost else "check" if n[Balanced.CONVERGED_ABOVE] else "ok"
-    return Conclusion("held", verdict, values | people_mpa())
+    verdict = "stop" if lost else "check" if above else "ok"
+    return Conclusion("held", verdict, values | people_mpa(), {"why": why})
 
 
 def _range_of_formula(held: pd.DataFrame) -> Iterator[Conclusion]:

@@ -98,7 +98,9 @@ def _outcome(settings: TrunkLoads, person: Person, task: Task) -> TaskOutcome:
     """A task with its stability and strength; raises where it cannot be posed."""
     options, gain = solver_options(settings, twice=True), settings.solving.stiffness_gain
     message, tone = "", task.tone_share if task.tone == "stated" else 0.0
-    held = hold_task(person, task, options, seek_least=settings.solving.strength)
+    held = hold_task(
+        person, task, options, least="sought" if settings.solving.strength else "untold"
+    )
     found = held.solved
     if task.tone == "stable":
         least = least_stable(held.person, held.task, options, gain)

@@ -67,7 +67,7 @@ class TaskOutcome:
 def outcome_of(person: Person, task: Task, options: SolverOptions) -> TaskOutcome:
     """What becomes of a task; a load that the arms do not reach is an outcome as well."""
     try:
-        held = hold_task(person, task, options)
+        held = hold_task(person, task, options, least="untold")
     except ValueError as why:
         return TaskOutcome(person, task, None, str(why))
     return TaskOutcome(person, task, held.solved, held.solved.message, held=held)

@@ -159,7 +159,9 @@ class Solving(BaseModel):
         description="q of a muscle's stiffness q force / length, in the question of stability",
     )
     strength: bool = Field(
-        default=True, description="whether to find the strength left at every level"
+        default=True,
+        description="whether to find the strength left at every level, and the least stress of "
+        "tasks that less than allowed holds",
     )
 
 

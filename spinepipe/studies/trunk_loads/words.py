@@ -13,6 +13,14 @@ ENDED = {
 }
 """How tasks ended that the model does not hold."""
 
+REFUSED = {
+    "weak": "{} take more",
+    "arms": "{} ask for what lever arms make at no stress",
+    "reach": "{} cannot be reached",
+    "unsolved": "{} did not converge",
+}
+"""Why pairs of body and task are refused, by count."""
+
 INPUTS = {
     "height_cm": "body height",
     "bmi": "body mass index",

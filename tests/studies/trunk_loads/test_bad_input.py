@@ -1,10 +1,12 @@
 """Whatever is wrong with subjects, tasks and muscles is told with file, row, found and remedy."""
 
+import re
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from cohort_cases import Change, Files, add, both, cell, line, swap, text, without
 from installed import need_male
@@ -337,6 +339,22 @@ def test_reach_moves_with_the_trunk(tmp_path: Path) -> None:
     (tmp_path / "upright").mkdir()
     (problem,) = told(tmp_path / "upright", place, task(TRUNK, "0", 3))
     assert problem.column == "hands_anterior_mm"
+    # shoulders 0.27 x 1.739 m above L5S1
+    beyond = np.hypot(900.0, -200.0 - 270.0 * 1.739) - 900.0
+    assert f"hands {beyond:.0f} mm beyond the reach" in problem.found
+    assert f"bring them {beyond:.0f} mm nearer" in problem.remedy
+
+
+def test_hands_too_far_say_which_posture_would_do(tmp_path: Path) -> None:
+    place = hands("900", "-200", "0")
+    (problem,) = told(tmp_path, place, task(TRUNK, "0", 3))
+    (bent,) = re.findall(rf"write {TRUNK} (-\d+), or bring them", problem.remedy)
+    for name, angle, fits in (("bent", int(bent), True), ("less", int(bent) + 1, False)):
+        (tmp_path / name).mkdir()
+        assert (told(tmp_path / name, place, task(TRUNK, str(angle), 3)) == []) == fits
+    (tmp_path / "never").mkdir()
+    (problem,) = told(tmp_path / "never", hands("1500", "300", "0"), task(TRUNK, "0", 3))
+    assert problem.remedy.startswith("bring them"), "no posture would do"
 
 
 def test_the_last_measured_bend_depends_on_what_the_angle_means(tmp_path: Path) -> None:

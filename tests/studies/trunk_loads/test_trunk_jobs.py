@@ -63,6 +63,27 @@ def test_every_task_has_its_rows_and_every_kilogram_its_place() -> None:
     assert {row["task"] for row in rows["paths"]} == {FEW[0]}
 
 
+def test_rows_tell_the_stress_that_a_task_takes_and_why_it_is_not_held() -> None:
+    whole = volunteers()
+    asked = whole.further["tasks"]
+    chosen = asked[asked["task"].isin(["standing", "load_close", "exertion_extension"])]
+    weaker = chosen.assign(largest_stress_mpa=[0.6, 0.3, 1.0], tone=pd.NA)
+    cohort = replace(whole, further={**whole.further, "tasks": weaker.reset_index(drop=True)})
+    rows = {
+        row["task"]: row for row in hold.rows_of(ASKED, cohort, "volunteer", Progress())["tasks"]
+    }
+    standing, above, beyond = (rows[name] for name in chosen["task"])
+    assert standing["status"] == Balanced.CONVERGED
+    assert 0.0 < standing["least_stress_mpa"] < 0.6
+    assert above["status"] == Balanced.CONVERGED_ABOVE
+    assert 0.3 == above["largest_stress_mpa"] < above["least_stress_mpa"] <= 1.3
+    assert above["highest_stress_mpa"] == pytest.approx(above["least_stress_mpa"], rel=0.03)
+    assert above["strength_used"] > 1.0, "of the strength at the stress asked for"
+    assert (beyond["status"], beyond["short_of"]) == (Balanced.BEYOND_STRENGTH, "strength")
+    assert beyond["least_stress_mpa"] > 1.3
+    assert beyond["short_at"] in beyond["message"]
+
+
 def test_what_is_out_of_reach_is_a_row_with_a_reason() -> None:
     row = task_of("woman", "flexion_70_with_load")
     assert row["status"] not in ("", Balanced.CONVERGED)
