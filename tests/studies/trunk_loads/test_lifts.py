@@ -10,6 +10,7 @@ import pytest
 from trunk_person import CLOSELY, made_up
 
 from spinepipe.cohort import Cohort, read
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.motion.recorded_motion import RecordedMotion, net_moments
 from spinepipe.muscles.muscle_equilibrium import SolverOptions
 from spinepipe.muscles.strength import hold_task
@@ -18,6 +19,7 @@ from spinepipe.progress import Progress
 from spinepipe.status import HELD
 from spinepipe.studies.recordings import RECORDED
 from spinepipe.studies.subjects import SUBJECTS
+from spinepipe.studies.trunk_loads.checks import check_lifts, check_trunk
 from spinepipe.studies.trunk_loads.kind import PER_LIFT, TrunkFiles
 from spinepipe.studies.trunk_loads.lifts import (
     LIFTED,
@@ -173,3 +175,38 @@ def test_a_study_has_the_lifts_that_a_person_has() -> None:
     assert set(PER_LIFT) <= set(files.tables)
     assert not {"tasks", "levels", "simplified"} & set(files.tables)
     assert files.job_files("lift_loads", "s01", "000")[1].endswith("trial-lift3.parquet")
+
+
+def problems(
+    changed: dict[str, pd.DataFrame | None], trials: tuple[str, ...] = ("lift1",)
+) -> list[str]:
+    """What checks of a study of lifts find in a changed cohort."""
+    tables = {**cohort().further, **changed}
+    further = {name: rows for name, rows in tables.items() if rows is not None}
+    study = STUDY.model_copy(update={"motions": Motions(trials=trials)})
+    document = YamlDocument("lifts.yaml", {"motions": {"trials": list(trials)}}, {})
+    other = replace(cohort(), further=further)
+    return [str(one) for one in check_trunk(document, study, other)]
+
+
+def test_a_cohort_of_lifts_needs_no_tasks_and_what_it_lacks_is_named() -> None:
+    assert problems({}) == []
+    trials = cohort().further["trials"]
+    moving = trials[trials["kind"] != "stance"]
+    (without,) = problems({"trials": moving})
+    assert "no stance of 's01'" in without
+    assert "mark one static" in without
+    (unknown,) = problems({}, ("lift9",))
+    assert "lift9" in unknown
+    (none,) = problems({"trials": None})
+    assert "a cohort without trials.csv" in none
+
+
+def test_recordings_are_looked_at_before_anything_runs() -> None:
+    document = YamlDocument("lifts.yaml", {}, {})
+    assert not list(check_lifts(document, STUDY, cohort(), FOLDER))
+    box = cohort().further["box"]
+    metres = box.assign(**{name: box[name] / 1000.0 for name in ("x_mm", "y_mm")})
+    other = replace(cohort(), further={**cohort().further, "box": metres})
+    found = [str(one) for one in check_lifts(document, STUDY, other, FOLDER)]
+    assert any("not in mm" in one for one in found)
