@@ -21,7 +21,7 @@ from spinepipe.motion.recorded_motion import RecordedMotion
 from spinepipe.motion.standing_spine import standing_spine
 from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.strength import HeldTask, hold_task
+from spinepipe.muscles.strength import HeldTask, Least, hold_task
 from spinepipe.muscles.task import Instant, Task
 from spinepipe.muscles.trunk import BODIES, LEVELS, body_of
 from spinepipe.progress import Progress
@@ -155,12 +155,12 @@ def tasks_of(
 
 
 def held_in_turn(
-    person: Person, tasks: Sequence[Task], options: SolverOptions
+    person: Person, tasks: Sequence[Task], options: SolverOptions, least: Least = "of_posture"
 ) -> Iterator[HeldTask]:
     """Tasks that follow each other closely, each begun where the one before ended."""
     before = None
     for task in tasks:
-        held = hold_task(person, task, options, nearby=before)
+        held = hold_task(person, task, options, least, before)
         before = held.solved
         yield held
 
@@ -216,7 +216,7 @@ def _samples(
         person = stands.varied(values)
         sized = of_mass(motion, person.subject.mass_kg / stands.subject.mass_kg)
         tasks = tasks_of(sized, frames, 1e6 * asked.largest_stress_mpa, values)
-        solved = [one.solved for one in held_in_turn(person, tasks, options)]
+        solved = [one.solved for one in held_in_turn(person, tasks, options, "untold")]
         found.append([one.compression for one in solved])
         held.append([one.status in HELD for one in solved])
     shape = (len(found), len(frames))

@@ -115,6 +115,13 @@ def test_the_frame_before_changes_no_load() -> None:
             )
 
 
+def test_a_frame_so_near_its_least_stress_that_rounds_swing_is_held_at_a_little_more() -> None:
+    motion = lift_of(cohort(), "s01", "lift3", stands().person)
+    tasks = tasks_of(motion, np.arange(72, 78), 0.6e6)
+    ended = [one.solved.status for one in held_in_turn(stands().person, tasks, SolverOptions())]
+    assert set(ended) <= set(HELD)
+
+
 def test_rows_tell_every_level_of_every_frame_and_what_hands_bear() -> None:
     found, frames = rows(), range(0, len(lift().time_s), 30)
     loads, hands = found["lift_loads"], found["lift_frames"]
