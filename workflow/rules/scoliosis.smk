@@ -24,7 +24,15 @@ rule personalise:
         outdated("personalise"),
         population=lambda wildcards: layout(wildcards.study).population_files(wildcards.model),
     output:
-        **tables_in(f"{PATIENTS}/jobs", "laws", "positions", "displacements", "curves", of=HELD),
+        **tables_in(
+            f"{PATIENTS}/jobs",
+            "laws",
+            "positions",
+            "displacements",
+            "curves",
+            "absolute_stiffness",
+            of=HELD,
+        ),
     log:
         f"{LOGS}/personalise/specimen-{{specimen}}/{{model}}.log",
     params:

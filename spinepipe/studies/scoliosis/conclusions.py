@@ -61,6 +61,7 @@ def conclusions(study: Scoliosis, cohort: Cohort, results: ResultTables) -> Iter
     for compared in (left_out, fitted):
         yield from _published(compared)
     yield from _ratios(results.table("laws"))
+    yield from _size(results.table("absolute_stiffness"))
     variants = results.table("variants")
     if len(variants):
         yield from _scale(tables)
@@ -219,6 +220,26 @@ def _ratios(laws: pd.DataFrame) -> Iterator[Conclusion]:
         "ratios": Value(len(asked), source="laws: identifiable"),
     }
     yield Conclusion("ratios", verdict, values)
+
+
+def _size(absolute: pd.DataFrame) -> Iterator[Conclusion]:
+    """How stiff spines are in all, where known traction tells it."""
+    if absolute.empty:
+        return
+    spines = absolute.drop_duplicates("specimen")
+    told = spines.dropna(subset=["mean_nm_per_deg"])
+    source = "absolute_stiffness: mean_nm_per_deg"
+    values = {"n": Value(len(told), source=source), "spines": Value(len(spines), source=source)}
+    if told.empty:
+        yield Conclusion("size", "none", values)
+        return
+    for name, column, value in (
+        ("least", "mean_low", told["mean_low"].min()),
+        ("most", "mean_high", told["mean_high"].max()),
+        ("middle", "mean_nm_per_deg", told["mean_nm_per_deg"].median()),
+    ):
+        values[name] = Value(float(value), "N m/°", source=f"absolute_stiffness: {column}")
+    yield Conclusion("size", "told", values)
 
 
 def tried(variants: pd.DataFrame, varied: str, group: str) -> pd.DataFrame:

@@ -6,7 +6,8 @@ answer to each unknown is taken from the equations of equilibrium. What the film
 as the population has it; the spread of what is left is the curvature at the optimum (Laplace).
 
 The uppermost vertebra, too, is read with error, and what holds it would pass the error on to the
-segment below: where it was on each film is fitted along, near where it was read.
+segment below: where it was on each film is fitted along, near where it was read. So is the frame of
+each film, that of its lowest vertebra, whose error turns all others by as much.
 
 The cost has several optima, so that a fit has several starts (`optima`).
 """
@@ -28,13 +29,12 @@ from spinepipe.model import SpineModel
 from spinepipe.statics.prescribed import PrescribedResult, alone, answered
 from spinepipe.statics.prescribed_chain import Ask
 from spinepipe.status import PrescribedStatus, Status
-from spinepipe.studies.scoliosis.films import LEFT, RIGHT
+from spinepipe.studies.scoliosis.films import LEFT, RIGHT, Film, FilmSd
 from spinepipe.studies.scoliosis.fixed_end_spine import BENDING, with_laws
 from spinepipe.studies.scoliosis.optima import FilmOptimum, Limits, best, optimum
 from spinepipe.studies.scoliosis.personal import Fitting, Patient, PersonalModel
 from spinepipe.studies.scoliosis.population import PatientPrior, Population, usual_population
 from spinepipe.studies.scoliosis.tangent_laws import SMALLEST_END, EndRotations
-from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 FARTHEST = 5.0
 """Numbers stay within so many SD of the population's mean."""
@@ -53,11 +53,8 @@ that a mirrored patient has mirrored starts."""
 LEVEL = 0.95
 """Of the intervals of ratios."""
 
-TOPS = 6
-"""Place and tilt of the uppermost vertebra on two films."""
-
-READINGS_OF_A_CHANGE = 2
-"""On the film and on the erect one."""
+READINGS = 12
+"""Frame of a film, then place and tilt of its uppermost vertebra, of two films."""
 
 NO_POSE = "in no first guess does a stable pose have the uppermost vertebra where the films have it"
 
@@ -81,8 +78,14 @@ class FilmInformation:
     def known(self, population: Population) -> PatientPrior:
         """The numbers, where the patient is of a population."""
         covariance = np.linalg.inv(self.matrix + population.precision)
-        mean = covariance @ (self.vector + population.precision @ population.mean)
-        return PatientPrior(mean.astype(float, copy=False), covariance.astype(float, copy=False))
+        drawn = covariance @ population.precision  # how far a number follows the population's mean
+        mean = covariance @ self.vector + drawn @ population.mean
+        unsure = drawn * population.unsure
+        return PatientPrior(mean.astype(float, copy=False), covariance + unsure @ unsure.T)
+
+    def decided(self, population: Population) -> float:
+        """Sum over numbers of the films' share of what is known of them."""
+        return float(np.trace(np.linalg.solve(self.matrix + population.precision, self.matrix)))
 
 
 @dataclass(frozen=True)
@@ -91,8 +94,8 @@ class FilmFitResult:
 
     Attributes
     ----------
-    unknowns : (3 S + 6,), the likeliest: the numbers, then by how many SD the uppermost vertebra
-        lay off where the right and the left film have it.
+    unknowns : (3 S + 12,), the likeliest: the numbers, then by how many SD frames and uppermost
+        vertebrae lay off where the right and the left film have them.
     known : the numbers and their covariance.
     poses : by position, those of the films, as the model takes them from neutral.
     decided : of how many the films, not the population, decided.
@@ -107,27 +110,25 @@ class FilmFitResult:
     poses: Mapping[str, PrescribedResult]
     cost: float
     n_optima: int
-
-    @property
-    def decided(self) -> float:
-        """Sum over numbers of the films' share of what is known of them."""
-        return float(np.trace(self.known.covariance @ self.information.matrix))
+    decided: float
 
 
 def _information(errors: Array, slopes: Array, at: Array) -> FilmInformation:
-    """What errors and their slopes at a point say of the numbers, wherever the top was.
+    """What errors and their slopes at a point say of the numbers, however the films were read.
 
-    Gauss-Newton's normal equations; the top's six unknowns, each with a prior of SD 1, are
+    Gauss-Newton's normal equations; the twelve unknowns of reading, each with a prior of SD 1, are
     eliminated by their Schur complement.
     """
-    matrix = slopes.T @ slopes + np.diag(np.arange(len(at)) >= len(at) - TOPS)
+    matrix = slopes.T @ slopes + np.diag(np.arange(len(at)) >= len(at) - READINGS)
     vector = matrix @ at - slopes.T @ errors
-    vector[-TOPS:] -= at[-TOPS:]
-    of_top = np.linalg.solve(
-        matrix[-TOPS:, -TOPS:], np.column_stack([matrix[-TOPS:], vector[-TOPS:]])
+    vector[-READINGS:] -= at[-READINGS:]
+    of_reading = np.linalg.solve(
+        matrix[-READINGS:, -READINGS:], np.column_stack([matrix[-READINGS:], vector[-READINGS:]])
     )
-    whole = np.column_stack([matrix, vector])[:-TOPS] - matrix[:-TOPS, -TOPS:] @ of_top
-    return FilmInformation(whole[:, : len(at) - TOPS], whole[:, -1])
+    whole = (
+        np.column_stack([matrix, vector])[:-READINGS] - matrix[:-READINGS, -READINGS:] @ of_reading
+    )
+    return FilmInformation(whole[:, : len(at) - READINGS], whole[:, -1])
 
 
 def ends_of(numbers: Array) -> tuple[Array, Array]:
@@ -161,32 +162,31 @@ def by_numbers(numbers: Array, size: float) -> Array:
 
 
 def prior(population: Population) -> tuple[Array, Array, Array]:
-    """What is known of the n = 3 S + 6 unknowns of a fit before any film.
+    """What is known of the n = 3 S + 12 unknowns of a fit before any film.
 
     Returns
     -------
     (n,) means and (n,) SDs, and (n, n) that makes of unknowns less their means errors of SD 1.
     """
-    root = np.eye(len(population.mean) + TOPS)
-    root[:-TOPS, :-TOPS] = population.root
-    means = np.append(population.mean, np.zeros(TOPS))
-    return means, np.append(population.sd, np.ones(TOPS)), root
+    root = np.eye(len(population.mean) + READINGS)
+    root[:-READINGS, :-READINGS] = population.root
+    means = np.append(population.mean, np.zeros(READINGS))
+    return means, np.append(population.sd, np.ones(READINGS)), root
 
 
 class FilmFit:
     """The films of one patient as a least squares problem."""
 
-    def __init__(self, patient: Patient, sd: Array, ask: Ask = alone) -> None:
+    def __init__(self, patient: Patient, sd: FilmSd, ask: Ask = alone) -> None:
         """A problem without a first guess.
 
         Parameters
         ----------
-        sd : (3,) m, m and rad, of a vertebra's place and tilt on a film less the model's.
         ask : who answers the questions of Newton's method.
         """
         self.patient, self.size, self.sd = patient, patient.size, sd
         self.segments = patient.chain.n_joints
-        model = self._model(next(self._guesses(usual_population(self.segments)))[:-TOPS])
+        model = self.model_of(next(self._guesses(usual_population(self.segments)))[:-READINGS])
         self.spine = replace(patient.fixed_end(model), ask=ask)
         self.near: dict[str, PrescribedResult] = {}
 
@@ -214,7 +214,7 @@ class FilmFit:
         further = (self._beyond_films(one, BEYOND_THE_FILM[0]) for one in numbers)
         return [
             list(self._guesses(population)),
-            *([np.append(one, np.zeros(TOPS))] for one in further),
+            *([np.append(one, np.zeros(READINGS))] for one in further),
         ]
 
     def point(self, population: Population) -> Point:
@@ -249,7 +249,7 @@ class FilmFit:
         ratio, spread = centred @ known.mean[:s], centred @ known.covariance[:s, :s] @ centred
         reach = float(norm.ppf(0.5 + 0.5 * LEVEL)) * np.sqrt(np.diag(spread))
         return PersonalModel(
-            self._model(known.mean),
+            self.model_of(known.mean),
             self.size * np.exp(known.mean[:s]),
             EndRotations(*ends_of(known.mean)),
             np.zeros(s, dtype=bool),
@@ -263,15 +263,15 @@ class FilmFit:
 
         Returns
         -------
-        (6 (S - 1),) and (6 (S - 1), 3 S + 6), or None where a film has no pose.
+        (6 (S - 1),) and (6 (S - 1), 3 S + 12), or None where a film has no pose.
         """
-        numbers, tops = unknowns[:-TOPS], unknowns[-TOPS:].reshape(2, 3)
+        numbers = unknowns[:-READINGS]
         laws, laws_by = laws_of(numbers, self.size), by_numbers(numbers, self.size)
         spine = self.spine.with_values(self.spine.chain.values[0], laws)
         errors, slopes = [], []
         for film_number, position in enumerate((RIGHT, LEFT)):
             film = self.patient.read.films[position]
-            top = film.top + self.sd * tops[film_number]
+            read, top, read_by, top_by = self._as_it_was(film, unknowns, film_number)
             posed = spine.at(top, self.near.get(position))
             if posed.result.status is not PrescribedStatus.CONVERGED:
                 return None
@@ -279,20 +279,36 @@ class FilmFit:
             # implicit function theorem: how equilibrium moves the pose when an unknown changes what
             # the joints hold, or where the top is
             held_by = np.zeros((len(posed.result.q), len(unknowns)))
-            held_by[:, :-TOPS] = self._held_by(posed.result.q, laws, laws_by)
-            top_by = np.zeros((3, len(unknowns)))
-            at = len(numbers) + 3 * film_number
-            top_by[:, at : at + 3] = np.diag(self.sd)
+            held_by[:, : len(numbers)] = self._held_by(posed.result.q, laws, laws_by)
             change = posed.answers_to(held_by, top_by)
             # the lowest vertebra is fixed and the uppermost held: what lies between is compared
-            off = (posed.film.rows - film.rows)[:, 1:-1] / self.sd[:, None]
-            by = posed.film_by[:, :-1] @ change / self.sd[:, None, None]
+            off = (posed.film.rows - read)[:, 1:-1] / self.sd.vertebra[:, None]
+            by = posed.film_by[:, :-1] @ change - read_by[:, 1:-1]
             errors.append(off.ravel())
-            slopes.append(by.reshape(len(errors[-1]), -1))
+            slopes.append((by / self.sd.vertebra[:, None, None]).reshape(off.size, -1))
         residuals, by_errors = counted(np.concatenate(errors))
         return residuals, by_errors[:, None] * np.vstack(slopes)
 
-    def _model(self, numbers: Array) -> SpineModel:
+    def _as_it_was(
+        self, film: Film, unknowns: Array, film_number: int
+    ) -> tuple[Array, Array, Array, Array]:
+        """(3, V) a film less the errors of its frame, (3,) its top less its own error too, and by
+        each unknown: (3, V, n) and (3, n)."""
+        # (6, n) of frame and top, as the unknowns make them
+        by = np.zeros((6, len(unknowns)))
+        own = len(unknowns) - READINGS + 6 * film_number
+        by[:, own : own + 6] = np.diag(np.concatenate([self.sd.frame, self.sd.vertebra]))
+        off = by @ unknowns
+        cos, sin, (right, up, tilt) = np.cos(off[2]), np.sin(off[2]), film.rows
+        turned = np.stack([cos * right + sin * up, cos * up - sin * right, tilt + off[2]])
+        read = turned + np.append(off[:2], 0.0)[:, None]
+        turning = np.stack([turned[1], -turned[0], np.ones_like(tilt)])
+        read_by = turning[..., None] * by[2]
+        read_by[:2] += by[:2, None]
+        return read, read[:, -1] + off[3:], read_by, read_by[:, -1] + by[3:]
+
+    def model_of(self, numbers: Array) -> SpineModel:
+        """The model of numbers (3 S,)."""
         laws = laws_of(numbers, self.size)
         return with_laws(self.patient.chain, self.patient.springs, laws)
 
@@ -309,7 +325,7 @@ class FilmFit:
     def _guesses(self, population: Population) -> Iterator[Array]:
         """First unknowns: those of the population, then ever straighter laws."""
         for beyond in BEYOND_THE_FILM:
-            yield np.append(self._beyond_films(population.mean, beyond), np.zeros(TOPS))
+            yield np.append(self._beyond_films(population.mean, beyond), np.zeros(READINGS))
 
     def _beyond_films(self, numbers: Array, beyond: float) -> Array:
         """The numbers (3 S,), with ends so many times as far as the rotations of both films."""
@@ -369,21 +385,20 @@ def _fitted(ends: Sequence[FilmOptimum | None], population: Population) -> FilmF
         return None
     films = len(found.residual) - len(found.x)  # the rest is of the population
     information = _information(found.residual[:films], found.jacobian[:films], found.x)
-    known = replace(information.known(population), mean=found.x[:-TOPS])
+    known = replace(information.known(population), mean=found.x[:-READINGS])
     return FilmFitResult(
-        found.x, information, known, found.status, found.poses, found.cost, n_optima
+        found.x,
+        information,
+        known,
+        found.status,
+        found.poses,
+        found.cost,
+        n_optima,
+        information.decided(population),
     )
 
 
 def _limits(population: Population) -> Limits:
-    """(3 S + 6,) each: least and largest unknowns, and their SD in the population."""
+    """(3 S + 12,) each: least and largest unknowns, and their SD in the population."""
     middle, scale, _ = prior(population)
     return middle - FARTHEST * scale, middle + FARTHEST * scale, scale
-
-
-def weighed_with(reading_mm: float, reading_deg: float, model_mm: float, model_deg: float) -> Array:
-    """(3,) m, m and rad: SD of a place and a tilt on a film less the model's, which has the erect
-    film's."""
-    read = np.sqrt(READINGS_OF_A_CHANGE) * np.array([reading_mm, reading_deg])
-    place, tilt = np.hypot(read, [model_mm, model_deg])
-    return np.array([place / MM_PER_M, place / MM_PER_M, tilt / DEG_PER_RAD])

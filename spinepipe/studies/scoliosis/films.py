@@ -6,7 +6,7 @@ its own lowest vertebra, which then lies at nought and stands upright.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -23,6 +23,10 @@ from spinepipe.units import DEG_PER_RAD, MM_PER_M
 ERECT, RIGHT, LEFT = "erect", "right_bending", "left_bending"
 NEEDED = (ERECT, RIGHT, LEFT)
 HELD_OUT = ("neutral", "traction")
+
+READINGS_OF_A_CHANGE = 2
+"""On the film and on the erect one. Those of the erect one are in both bending films; here they are
+two, so that the films are trusted less in what they differ by."""
 
 CENTRE = ("y_mm", "z_mm", "orientation_deg")
 CORNERS = tuple(
@@ -88,12 +92,16 @@ class PatientFilms:
     sd : (3,) m, m and rad, SD of one reading: of right and up as seen from the lowest vertebra, of
         a vertebra's own tilt; NaN where none tells.
     readings : by position, how many were averaged.
+    own_sd : m, SD of a vertebra's own place, whatever the frame of the reading.
+    traction : by position, N; NaN without.
     """
 
     films: Mapping[str, Film]
     scales: Mapping[str, float]
     sd: Array
     readings: Mapping[str, int]
+    own_sd: float = np.nan
+    traction: Mapping[str, float] = field(default_factory=dict)
 
     def turned(self, position: str) -> Array:
         """(V - 1,) rad: r, how far segments have turned since the erect film, right positive."""
@@ -124,8 +132,13 @@ def read_films(cohort: Cohort, patient: str) -> PatientFilms:
     }
     every = {name: each * np.array([[scales[name]] * 2 + [1.0]]).T for name, each in every.items()}
     films = {name: Film(*each.mean(axis=0)) for name, each in every.items()}
+    traction = {}
+    if "traction_n" in rows:
+        pulls = rows.groupby("position", sort=False)["traction_n"].mean()
+        traction = {str(name): float(pull) for name, pull in pulls.items()}
     readings = {name: len(each) for name, each in every.items()}
-    return PatientFilms(films, scales, _sd(list(every.values())), readings)
+    repeated = list(every.values())
+    return PatientFilms(films, scales, _sd(repeated), readings, _own_sd(repeated), traction)
 
 
 def by_reading(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
@@ -233,6 +246,20 @@ def _sd(films: Sequence[Array]) -> Array:
     return found
 
 
+def _own_sd(films: Sequence[Array]) -> float:
+    """m, each way: SD of places about the mean film (K, 3, V), turned and shifted onto it."""
+    squares, count = 0.0, 0
+    for each in (one for one in films if len(one) > 1):
+        right, up = (each.mean(axis=0) - each.mean(axis=(0, 2))[:, None])[:2]
+        turning = np.append(up, -right) / np.hypot(right, up).max()
+        level = np.kron(np.eye(2), np.ones(len(right)))
+        moves = np.vstack([level, turning]).T  # (2 V, 3) what a frame's error does to all places
+        off = (each - each.mean(axis=0))[:, :2].reshape(len(each), -1).T
+        squares += float(((off - moves @ np.linalg.lstsq(moves, off)[0]) ** 2).sum())
+        count += (len(each) - 1) * (len(off) - 3)
+    return float(np.sqrt(squares / count)) if count else np.nan
+
+
 def step_sd_deg(cohort: Cohort) -> float | None:
     """SD of a tilt that is exact but for its last decimal; None of corners, or without a step."""
     rows = cohort.further["films"]
@@ -245,17 +272,39 @@ def step_sd_deg(cohort: Cohort) -> float | None:
 
 
 def reading_noise(settings: Scoliosis, cohort: Cohort) -> Array:
-    """(2,) SD of what is taken for a place seen from the lowest vertebra (mm, each way) and for a
-    vertebra's own tilt (deg); NaN where nothing tells.
+    """(3,) SD of what is taken for a place seen from the lowest vertebra (mm, each way), for a
+    vertebra's own tilt (deg) and its own place (mm, each way); NaN where nothing tells.
 
     Repeated readings tell; where there are none, the study may state it. A mean of readings has
     less than one: by the mean over all films of one over their readings.
     """
     patients = [read_films(cohort, name) for name in cohort.specimen_names]
-    known = [one.sd for one in patients if np.isfinite(one.sd).all()]
+    known = [(*one.sd, one.own_sd) for one in patients if np.isfinite(one.sd).all()]
     if known:
         share = np.mean([1.0 / count for one in patients for count in one.readings.values()])
-        right, up, tilt = np.sqrt(share * np.mean(np.square(known), axis=0))
-        return np.array([MM_PER_M * np.sqrt(0.5 * (right**2 + up**2)), DEG_PER_RAD * tilt])
-    stated = (settings.place_sd_mm, settings.tilt_sd_deg)
+        right, up, tilt, own = np.sqrt(share * np.mean(np.square(known), axis=0))
+        place = np.sqrt(0.5 * (right**2 + up**2))
+        return np.array([MM_PER_M * place, DEG_PER_RAD * tilt, MM_PER_M * own])
+    stated = (settings.place_sd_mm, settings.tilt_sd_deg, settings.place_sd_mm)
     return np.array([np.nan if one is None else one for one in stated])
+
+
+@dataclass(frozen=True)
+class FilmSd:
+    """SD of a film less the model, which begins with the erect film.
+
+    Attributes
+    ----------
+    vertebra : (3,) m, m and rad, of a vertebra's own place and tilt; the model's misses among it.
+    frame : (3,) m, m and rad, of the lowest vertebra's place and tilt, from reading alone.
+    """
+
+    vertebra: Array
+    frame: Array
+
+
+def film_sd(reading_mm: float, reading_deg: float, model_mm: float, model_deg: float) -> FilmSd:
+    """Of the readings of one vertebra, and of the model."""
+    units = np.array([MM_PER_M, MM_PER_M, DEG_PER_RAD])
+    read = np.sqrt(READINGS_OF_A_CHANGE) * np.array([reading_mm, reading_mm, reading_deg]) / units
+    return FilmSd(np.hypot(read, np.array([model_mm, model_mm, model_deg]) / units), read)

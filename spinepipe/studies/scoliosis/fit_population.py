@@ -6,11 +6,11 @@ under it, as the parabolas hold near the fits alone.
 """
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 
 from spinepipe.cohort import Cohort
-from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.progress import Progress
@@ -19,14 +19,14 @@ from spinepipe.studies.scoliosis.film_fit import (
     FilmFitResult,
     FilmInformation,
     fit_alike,
-    weighed_with,
 )
-from spinepipe.studies.scoliosis.films import reading_noise
+from spinepipe.studies.scoliosis.films import FilmSd, film_sd, reading_noise
 from spinepipe.studies.scoliosis.personal import patient_of
 from spinepipe.studies.scoliosis.population import (
     Population,
     PopulationEstimate,
     population_rows,
+    unsure_means,
     update_population,
     usual_population,
 )
@@ -53,15 +53,14 @@ def run(root: str, study: str, output: str) -> None:
     write(from_rows(POPULATION, list(rows)), output, provenance("population", settings, cohort))
 
 
-def weights(settings: Scoliosis, cohort: Cohort) -> Array:
-    """(3,) m, m and rad; films of which nothing tells how they were read count as exact."""
-    place, tilt = np.nan_to_num(reading_noise(settings, cohort))
-    seen = float(place), float(np.sqrt(2.0) * tilt)  # a tilt less that of the lowest vertebra
-    return weighed_with(*seen, settings.model_sd_mm, settings.model_sd_deg)
+def weights(settings: Scoliosis, cohort: Cohort) -> FilmSd:
+    """With which films are weighed; those of which nothing tells how they were read are exact."""
+    _, tilt, own = np.nan_to_num(reading_noise(settings, cohort)).tolist()
+    return film_sd(own, tilt, settings.model_sd_mm, settings.model_sd_deg)
 
 
 def fit_population(
-    settings: Scoliosis, cohort: Cohort, sd: Array, progress: Progress
+    settings: Scoliosis, cohort: Cohort, sd: FilmSd, progress: Progress
 ) -> PopulationEstimate:
     """Rounds of fits of all patients, until the population stands still."""
     patients = {name: patient_of(settings, cohort, name) for name in cohort.specimen_names}
@@ -79,6 +78,8 @@ def fit_population(
         change = _change(before, population)
         if change < LAST_ROUND or not fits:
             break
+    films = [one.information.matrix for one in fits.values()]
+    population = replace(population, unsure=unsure_means(population, films))
     unfitted = tuple(name for name in patients if name not in fits)
     return PopulationEstimate(population, rounds, change, len(fits), unfitted, change < LAST_ROUND)
 

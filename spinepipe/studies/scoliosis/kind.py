@@ -14,11 +14,12 @@ from spinepipe.studies.scoliosis.settings import Scoliosis
 from spinepipe.studies.scoliosis.tables import JALALIAN_2017_COHORTS
 from spinepipe.studies.study_files import Figure, StudyFiles
 
-OF_JOBS = ("laws", "positions", "displacements", "curves")
+OF_JOBS = ("laws", "positions", "displacements", "curves", "absolute_stiffness")
 """Tables joined from job files, one for each patient and model."""
 
 _ANALYSES = (
     Job("accuracy", "", ("positions", "displacements", "curves"), ("accuracy",)),
+    Job("clinical", "", (), ("clinical",)),
     Job("variation", "", ("variants",), ("variation",)),
     Job("by_range", "", ("displacements",), ("by_range",)),
     Job("statistics", "significance", ("positions", "displacements", "curves"), ("statistics",)),

@@ -11,6 +11,7 @@ from spinepipe.studies.scoliosis.conclusions import PUBLISHED, conclusions
 from spinepipe.studies.scoliosis.films import HELD_OUT
 from spinepipe.studies.scoliosis.settings import MODELS, Scoliosis
 from spinepipe.studies.scoliosis.tables import (
+    ABSOLUTE_STIFFNESS,
     ACCURACY,
     AGAINST_JALALIAN_2017,
     BY_RANGE,
@@ -44,7 +45,16 @@ _SHOWN = {
 None has a row for a person: those of single spines are in files.
 """
 
-_READ = (*_SHOWN, LAWS, POSITIONS, DISPLACEMENTS, CURVES, VARIANTS, AGAINST_JALALIAN_2017)
+_READ = (
+    *_SHOWN,
+    ABSOLUTE_STIFFNESS,
+    LAWS,
+    POSITIONS,
+    DISPLACEMENTS,
+    CURVES,
+    VARIANTS,
+    AGAINST_JALALIAN_2017,
+)
 READ = tuple(table.name for table in _READ)
 """Tables whose rows the page needs; of the others it tells where they come from."""
 

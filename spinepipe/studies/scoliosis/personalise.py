@@ -18,8 +18,15 @@ from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT
 from spinepipe.studies.scoliosis.fixed_end_spine import SpinePose
 from spinepipe.studies.scoliosis.personal import POSED, WAYS, Patient, PersonalModel, patient_of
 from spinepipe.studies.scoliosis.population import population_of
+from spinepipe.studies.scoliosis.pulled import AbsoluteStiffness, stiffness_by_pulls
 from spinepipe.studies.scoliosis.settings import Scoliosis
-from spinepipe.studies.scoliosis.tables import CURVES, DISPLACEMENTS, LAWS, POSITIONS
+from spinepipe.studies.scoliosis.tables import (
+    ABSOLUTE_STIFFNESS,
+    CURVES,
+    DISPLACEMENTS,
+    LAWS,
+    POSITIONS,
+)
 from spinepipe.studies.scoliosis.tangent_laws import ends_of
 from spinepipe.tables import from_rows, read_frame, write
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
@@ -33,6 +40,12 @@ UNSETTLED = "the population did not stand still within its rounds"
 REGION = ("films_low", "films_high", "open_below", "open_above")
 """Columns of what films say of a ratio."""
 
+ABSOLUTE = (
+    *("at_rest_nm_per_deg", "low", "high"),
+    *("mean_nm_per_deg", "mean_low", "mean_high"),
+)
+"""Columns of what known pulls tell."""
+
 PUSHES = ("push_right_n", "push_up_n", "push_right_bending_nm", "push_extension_nm")
 
 
@@ -45,6 +58,7 @@ def run(
     positions: str,
     displacements: str,
     curves: str,
+    absolute_stiffness: str,
     population: list[str],
 ) -> None:
     """Write the rows of a patient and a model; a model of a population reads that of all."""
@@ -54,8 +68,8 @@ def run(
     marks = [mark_of(path) for path in population]
     made_by = provenance("personalise", settings, cohort, [specimen], marks)
     places = zip(
-        (LAWS, POSITIONS, DISPLACEMENTS, CURVES),
-        (laws, positions, displacements, curves),
+        (LAWS, POSITIONS, DISPLACEMENTS, CURVES, ABSOLUTE_STIFFNESS),
+        (laws, positions, displacements, curves, absolute_stiffness),
         strict=True,
     )
     for table, path in places:
@@ -71,7 +85,7 @@ def rows_of(
 ) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
     patient = patient_of(settings, cohort, specimen)
-    personal, message = _personal(settings, patient, model, population)
+    personal, message, known_pulls = _personal(settings, patient, model, population)
     spine = patient.fixed_end(personal.model)
     known: Row = {"specimen": specimen, "model": model}
     taken: Row = {
@@ -88,6 +102,7 @@ def rows_of(
         POSITIONS.name: [],
         DISPLACEMENTS.name: [],
         CURVES.name: [],
+        ABSOLUTE_STIFFNESS.name: [known | row for row in _absolute(patient, known_pulls)],
     }
     for position in patient.read.films:
         if position == ERECT:
@@ -112,22 +127,38 @@ def rows_of(
 
 def _personal(
     settings: Scoliosis, patient: Patient, model: str, population: pd.DataFrame | None
-) -> tuple[PersonalModel, str]:
-    """The model, and what is to be said of how it was come by."""
+) -> tuple[PersonalModel, str, AbsoluteStiffness | str]:
+    """The model, what is to be said of how it was come by, and what known pulls tell of it."""
     if population is None:
         personal = WAYS[model](patient, settings)
-        return personal, _of_fit(personal)
+        return personal, _of_fit(personal), ""
     everyone, sd = population_of(population)
     fit = FilmFit(patient, sd)
     try:
         fitted = fit.fit(everyone)
     except NoFit as why:
-        return fit.unfitted(everyone), f"not fitted: {why}; stiffness is that of the population"
+        told = f"not fitted: {why}; stiffness is that of the population"
+        return fit.unfitted(everyone), told, ""
     personal = fit.personal(fitted)
     unsettled = UNSETTLED if (population["status"] == Status.NOT_CONVERGED.value).any() else ""
     if settings.film_regions:
         personal = replace(personal, by_films=regions(fit, everyone, fitted))
-    return personal, joined(unsettled, _of_fit(personal))
+    absolute: AbsoluteStiffness | str = ""
+    if np.isfinite(list(patient.read.traction.values())).any():
+        depth = settings.profile.endplate_depth_mm
+        absolute = stiffness_by_pulls(patient, fit, fitted.known, depth)
+    return personal, joined(unsettled, _of_fit(personal)), absolute
+
+
+def _absolute(patient: Patient, found: AbsoluteStiffness | str) -> Iterator[Row]:
+    """Rows of a patient with films under known pulls; of others none."""
+    for number, joint in enumerate(patient.chain.joints if found else ()):
+        row: Row = {"joint": joint, "films": "", "message": found}
+        if isinstance(found, AbsoluteStiffness):
+            ends = (*found.joints[:, number], *found.mean)
+            row |= dict(zip(ABSOLUTE, map(float, ends), strict=True))
+            row |= {"films": ", ".join(found.films), "message": ""}
+        yield dict.fromkeys(ABSOLUTE) | row
 
 
 def _of_fit(personal: PersonalModel) -> str:

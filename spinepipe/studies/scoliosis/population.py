@@ -11,7 +11,7 @@ count as so many observations.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from scipy.stats import norm
 
 from spinepipe.effects.contract import Array
 from spinepipe.status import Status, joined
+from spinepipe.studies.scoliosis.films import FilmSd
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 PER_SEGMENT = ("ratio", "lower_end", "upper_end")
@@ -49,11 +50,14 @@ class Population:
     Attributes
     ----------
     mean : (3 S,) of all numbers of a patient. ratio_sd, end_sd : between segments of one level.
+    unsure : (3 S,) SD of the means themselves, which few or coarse films leave open; nought where
+        they are taken as known.
     """
 
     mean: Array
     ratio_sd: float
     end_sd: float
+    unsure: Array = field(default_factory=lambda: np.zeros(()))
 
     @property
     def segments(self) -> int:
@@ -144,6 +148,22 @@ def _level_means(before: Population, means: Array) -> Array:
     return np.concatenate([ratios, common + kept * (ends - ends.mean())])
 
 
+def unsure_means(population: Population, films: Sequence[Array]) -> Array:
+    """(3 S,) SD of the means, by what the films of each patient say of its numbers (3 S, 3 S).
+
+    A patient with films of precision M from a population of covariance C tells of its mean with
+    the precision (M^-1 + C)^-1; the assumptions about levels are there before any patient.
+    """
+    s, covariance = population.segments, np.linalg.inv(population.precision)
+    before = np.diag(np.repeat([LEVEL_RATIO_SPREAD, LEVEL_END_SPREAD], [s, 2 * s]) ** 2)
+    before[s:, s:] += END_FACTOR**2
+    told = np.linalg.inv(before)
+    for one in films:
+        told += np.linalg.solve(np.eye(3 * s) + one @ covariance, one)
+    found: Array = np.sqrt(np.diag(np.linalg.inv(told)))
+    return found
+
+
 def _spread(squares: float, count: int, usual: float) -> float:
     return float(np.sqrt((squares + ASSUMED_COUNT * usual**2) / (count + ASSUMED_COUNT)))
 
@@ -167,21 +187,26 @@ class PopulationEstimate:
 
 
 def population_rows(
-    found: PopulationEstimate, joints: Sequence[str], sd: Array
+    found: PopulationEstimate, joints: Sequence[str], sd: FilmSd
 ) -> Iterator[dict[str, Any]]:
-    """A row for each quantity and joint."""
+    """A row for each quantity and joint, beside the SD with which films were weighed."""
     population = found.population
     means = population.mean.reshape(len(PER_SEGMENT), -1)
     spreads = population.sd.reshape(len(PER_SEGMENT), -1)
+    unsure = np.broadcast_to(population.unsure, len(population.mean)).reshape(means.shape)
     reach_95 = float(norm.ppf(0.975))
     own = (population.ratio_sd, population.end_sd, population.end_sd)
     without = f"without {', '.join(found.unfitted)}: no fit" if found.unfitted else ""
     moving = f"after {found.rounds} rounds a logarithm still changed by {found.change:.2g}"
     if found.settled or not found.patients:
         moving = ""
-    for quantity, mean, spread, sd_log in zip(PER_SEGMENT, means, spreads, own, strict=True):
+    for quantity, mean, spread, sd_log, open_ in zip(
+        PER_SEGMENT, means, spreads, own, unsure, strict=True
+    ):
         unit = DEG_PER_RAD if quantity != "ratio" else 1.0
-        for joint, middle, reach in zip(joints, mean, reach_95 * spread, strict=True):
+        for joint, middle, reach, mean_sd in zip(
+            joints, mean, reach_95 * spread, open_, strict=True
+        ):
             yield {
                 "quantity": quantity,
                 "joint": joint,
@@ -190,24 +215,33 @@ def population_rows(
                 "low": unit * float(np.exp(middle - reach)),
                 "high": unit * float(np.exp(middle + reach)),
                 "sd_log": sd_log,
+                "mean_sd_log": float(mean_sd),
                 "n_patients": found.patients,
                 "rounds": found.rounds,
                 "last_change": found.change if np.isfinite(found.change) else None,
-                "place_sd_mm": MM_PER_M * float(sd[0]),
-                "tilt_sd_deg": DEG_PER_RAD * float(sd[2]),
+                "place_sd_mm": MM_PER_M * float(sd.vertebra[0]),
+                "tilt_sd_deg": DEG_PER_RAD * float(sd.vertebra[2]),
+                "frame_place_sd_mm": MM_PER_M * float(sd.frame[0]),
+                "frame_tilt_sd_deg": DEG_PER_RAD * float(sd.frame[2]),
                 "message": joined(without, moving),
                 "status": (Status.CONVERGED if found.settled else Status.NOT_CONVERGED).value,
             }
 
 
-def population_of(rows: pd.DataFrame) -> tuple[Population, Array]:
-    """The population of a table's rows, and (3,) m, m and rad: SD that films were weighed with."""
-    parts, spreads = [], []
+def population_of(rows: pd.DataFrame) -> tuple[Population, FilmSd]:
+    """The population of a table's rows, and the SD with which films were weighed."""
+    parts, spreads, unsure = [], [], []
     for quantity in PER_SEGMENT:
         chosen = rows[rows["quantity"] == quantity]
         unit = 1.0 if quantity == "ratio" else DEG_PER_RAD
         parts.append(np.log(chosen["mean"].to_numpy(float) / unit))
+        unsure.append(chosen["mean_sd_log"].to_numpy(float))
         spreads.append(float(chosen["sd_log"].iloc[0]))
-    place = float(rows["place_sd_mm"].iloc[0]) / MM_PER_M
-    sd = np.array([place, place, float(rows["tilt_sd_deg"].iloc[0]) / DEG_PER_RAD])
-    return Population(np.concatenate(parts), spreads[0], spreads[1]), sd
+    first = rows.iloc[0].to_dict()
+    sd = (
+        np.array([float(first[f"{name}place_sd_mm"])] * 2 + [float(first[f"{name}tilt_sd_deg"])])
+        / [MM_PER_M, MM_PER_M, DEG_PER_RAD]
+        for name in ("", "frame_")
+    )
+    means = np.concatenate(parts)
+    return Population(means, spreads[0], spreads[1], np.concatenate(unsure)), FilmSd(*sd)

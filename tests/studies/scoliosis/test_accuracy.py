@@ -15,7 +15,7 @@ import scoliosis_cases
 from scoliosis_cases import shipped, write_shipped
 
 from spinepipe.studies.scoliosis.accuracy import accuracy_rows
-from spinepipe.studies.scoliosis.films import CORNERS, read_films, reading_noise
+from spinepipe.studies.scoliosis.films import CORNERS, film_sd, read_films, reading_noise
 from spinepipe.studies.scoliosis.personalise import rows_of
 from spinepipe.studies.scoliosis.population import (
     PopulationEstimate,
@@ -46,7 +46,8 @@ TABLES = (LAWS, POSITIONS, DISPLACEMENTS, CURVES)
 def tables() -> dict[str, pd.DataFrame]:
     usual = PopulationEstimate(usual_population(len(COHORT.joint_names)), 1, 0.0, 0, (), True)
     population = from_rows(
-        POPULATION, list(population_rows(usual, COHORT.joint_names, np.array([1e-3, 1e-3, 0.01])))
+        POPULATION,
+        list(population_rows(usual, COHORT.joint_names, film_sd(0.5, 0.5, 0.5, 0.5))),
     )
     read = {"tangent_fitted": (population.to_pandas(),)}
     rows = [

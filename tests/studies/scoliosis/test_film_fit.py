@@ -14,15 +14,14 @@ from spinepipe.progress import Progress
 from spinepipe.studies.scoliosis import film_regions
 from spinepipe.studies.scoliosis.film_fit import (
     NO_POSE,
-    TOPS,
+    READINGS,
     FilmFit,
     NoFit,
     by_numbers,
     laws_of,
-    weighed_with,
 )
 from spinepipe.studies.scoliosis.film_regions import by_ratio, region
-from spinepipe.studies.scoliosis.films import LEFT, RIGHT
+from spinepipe.studies.scoliosis.films import LEFT, RIGHT, FilmSd, film_sd
 from spinepipe.studies.scoliosis.fit_population import fit_population, weights
 from spinepipe.studies.scoliosis.personal import Patient, patient_of
 from spinepipe.studies.scoliosis.personalise import rows_of
@@ -36,7 +35,11 @@ def patient() -> Patient:
     return patient_of(STUDY, shipped(2), "p01")
 
 
-SHARP = weighed_with(0.0, 0.0, 0.05, 0.02)
+SHARP = film_sd(0.0, 0.0, 0.05, 0.02)
+
+
+def times(factor: float, sd: FilmSd) -> FilmSd:
+    return FilmSd(factor * sd.vertebra, factor * sd.frame)
 
 
 def some_unknowns(patient: Patient) -> np.ndarray:
@@ -44,13 +47,13 @@ def some_unknowns(patient: Patient) -> np.ndarray:
     numbers = usual_population(s).mean.copy()
     numbers[:s] += rng.normal(0.0, 0.3, s)
     numbers[s:] += 0.3 + rng.normal(0.0, 0.1, 2 * s)
-    return np.append(numbers, rng.normal(0.0, 0.5, TOPS))
+    return np.append(numbers, rng.normal(0.0, 0.5, READINGS))
 
 
-def filmed_with(patient: Patient, numbers: np.ndarray, sd: np.ndarray) -> Patient:
+def filmed_with(patient: Patient, numbers: np.ndarray, sd: FilmSd) -> Patient:
     """The patient with bending films of the model of these numbers."""
     fit = FilmFit(patient, sd)
-    spine = fit.spine.with_model(fit._model(numbers))
+    spine = fit.spine.with_model(fit.model_of(numbers))
     poses = {name: spine.at(patient.read.films[name].top) for name in (RIGHT, LEFT)}
     assert all(pose.result.status == "converged" for pose in poses.values())
     films = {**patient.read.films, **{name: pose.film for name, pose in poses.items()}}
@@ -75,7 +78,7 @@ def test_errors_change_with_every_unknown_as_told(patient: Patient) -> None:
     fit, at = FilmFit(patient, weights_of_a_usual_study()), some_unknowns(patient)
     found = fit.missed(at)
     assert found is not None
-    for number in (0, 6, 13, 14, 25, 30, 41, 42, 44, 47):
+    for number in (0, 6, 13, 14, 25, 30, 41, 42, 44, 47, 50, 53):
         step = np.zeros(len(at))
         step[number] = 1e-5
         ends = [fit.missed(at + s * step) for s in (1.0, -1.0)]
@@ -83,12 +86,12 @@ def test_errors_change_with_every_unknown_as_told(patient: Patient) -> None:
         np.testing.assert_allclose(found[1][:, number], change, rtol=0, atol=1e-6)
 
 
-def weights_of_a_usual_study() -> np.ndarray:
-    return weighed_with(0.5, 0.7, STUDY.model_sd_mm, STUDY.model_sd_deg)
+def weights_of_a_usual_study() -> FilmSd:
+    return film_sd(0.5, 0.7, STUDY.model_sd_mm, STUDY.model_sd_deg)
 
 
 def test_films_of_the_model_itself_are_reproduced(patient: Patient) -> None:
-    hidden = some_unknowns(patient)[:-TOPS]
+    hidden = some_unknowns(patient)[:-READINGS]
     fit = FilmFit(filmed_with(patient, hidden, SHARP), SHARP)
     found = fit.fit(usual_population(patient.chain.n_joints))
     assert found.status.usable
@@ -102,7 +105,8 @@ def test_films_of_the_model_itself_are_reproduced(patient: Patient) -> None:
 
 def test_what_films_decide_falls_with_how_coarsely_they_are_read(patient: Patient) -> None:
     population = usual_population(patient.chain.n_joints)
-    decided = [FilmFit(patient, f * SHARP).fit(population).decided for f in (1.0, 10.0, 100.0)]
+    fits = [FilmFit(patient, times(f, SHARP)).fit(population) for f in (1.0, 10.0, 100.0)]
+    decided = [one.decided for one in fits]
     assert 41.0 > decided[0] > decided[1] > decided[2] > 0.0
 
 
@@ -127,7 +131,7 @@ def test_a_ratio_takes_the_place_of_a_number() -> None:
 
 def test_films_close_the_ratios_that_move_them_and_leave_others_open(patient: Patient) -> None:
     """Films of a known chain: regions hold its ratios. Coarsely read, nothing is told."""
-    hidden = some_unknowns(patient)[:-TOPS]
+    hidden = some_unknowns(patient)[:-READINGS]
     sd, s = weights_of_a_usual_study(), patient.chain.n_joints
     population = usual_population(s)
     filmed = FilmFit(filmed_with(patient, hidden, sd), sd)
@@ -138,7 +142,7 @@ def test_films_close_the_ratios_that_move_them_and_leave_others_open(patient: Pa
         assert reach.open_below is reach.open_above is is_open
         if not is_open:
             assert (reach.low or np.inf) < true[segment] < (reach.high or 0.0)
-    coarse = FilmFit(patient, 100.0 * sd)
+    coarse = FilmFit(patient, times(100.0, sd))
     reach = region(coarse, population, coarse.fit(population), 5)
     assert reach.open_below
     assert reach.open_above

@@ -20,8 +20,8 @@ from spinepipe.progress import Progress
 from spinepipe.statics.prescribed import PrescribedResult, _Problem, alone, hold_at
 from spinepipe.status import PrescribedStatus, Status
 from spinepipe.studies.scoliosis import fit_population as learning
-from spinepipe.studies.scoliosis.film_fit import TOPS, FilmFit, fit_alike, laws_of, weighed_with
-from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT
+from spinepipe.studies.scoliosis.film_fit import READINGS, FilmFit, fit_alike, laws_of
+from spinepipe.studies.scoliosis.films import FILMS, PATIENTS, RIGHT, film_sd
 from spinepipe.studies.scoliosis.optima import FilmOptimum, best, optimum
 from spinepipe.studies.scoliosis.personal import linear_regions, patient_of, region_optimum
 from spinepipe.studies.scoliosis.personalise import UNSETTLED, rows_of
@@ -29,7 +29,7 @@ from spinepipe.studies.scoliosis.population import Population, population_rows, 
 from spinepipe.studies.scoliosis.tables import LAWS, POPULATION, POSITIONS
 from spinepipe.tables import from_rows
 
-SD = weighed_with(0.03, 0.03, STUDY.model_sd_mm, STUDY.model_sd_deg)
+SD = film_sd(0.03, 0.03, STUDY.model_sd_mm, STUDY.model_sd_deg)
 SEGMENTS = 14
 RATIOS = [-51, -12, -15, -13, -37, -28, 18, 41, 23, 6, -5, 22, 31, 19]
 LOWER = [-213, -221, -244, -238, -236, -235, -260, -263, -255, -243, -242, -246, -251, -253]
@@ -70,7 +70,7 @@ def held_off_the_path(fit: FilmFit, numbers: Array) -> tuple[PrescribedResult, P
 def test_the_pose_is_the_end_of_the_way_and_not_where_one_long_step_lands(cohort: Cohort) -> None:
     """p14 with wide ends: all at once from neutral another stable pose is met, 2.5 deg off."""
     fit = fit_of(cohort, "p14")
-    numbers = list(fit._guesses(usual_population(SEGMENTS)))[2][:-TOPS]
+    numbers = list(fit._guesses(usual_population(SEGMENTS)))[2][:-READINGS]
     at_once, found = held_off_the_path(fit, numbers)
     assert at_once.status is found.status is PrescribedStatus.CONVERGED
     assert np.abs(at_once.q - found.q).max() > np.deg2rad(2.0)
@@ -89,7 +89,7 @@ def test_a_fit_from_poses_off_the_path_ends_on_it(cohort: Cohort) -> None:
     """Trial poses begin on another path; what is told are errors of the poses from neutral."""
     fit, population = fit_of(cohort, "p14"), usual_population(SEGMENTS)
     unknowns = list(fit._guesses(population))[2]
-    off, _ = held_off_the_path(fit, unknowns[:-TOPS])
+    off, _ = held_off_the_path(fit, unknowns[:-READINGS])
     usual = fit.fit(population)
     before = replace(usual, unknowns=unknowns, poses={**usual.poses, RIGHT: off})
     for start in (None, before):
@@ -122,7 +122,7 @@ def test_starts_of_one_patient_are_those_of_its_mirror_image(cohort: Cohort) -> 
     fit, s = fit_of(cohort, "p01"), SEGMENTS
     level = replace(LEARNED, mean=np.concatenate([LEARNED.mean[: 2 * s], LEARNED.mean[s : 2 * s]]))
     fit._beyond_films = lambda numbers, beyond: numbers  # type: ignore[method-assign]
-    starts = [one[0][:-TOPS] for one in fit.starts(level)[1:]]
+    starts = [one[0][:-READINGS] for one in fit.starts(level)[1:]]
     turned = [np.concatenate([one[:s], one[2 * s :], one[s : 2 * s]]) for one in starts]
     half = len(starts) // 2
     np.testing.assert_array_equal(starts, turned[half:] + turned[:half])

@@ -122,6 +122,9 @@ def test_readings_are_averaged_and_their_scatter_is_the_noise(tmp_path: Path) ->
     centre = 0.25 * np.sqrt(2.0 * (20.0**2 + 12.0**2) / 24.0**2)
     aside = np.hypot(centre, tilt * 30.0 * np.sqrt((1 + 4 + 9) / 3.0)) / 1e3
     np.testing.assert_allclose(read.sd[[0, 2]], [aside, tilt], rtol=0.1)
+    # of one vertebra's own centre, whatever the frame: the mean variance of right and up
+    own = 0.25 * np.sqrt(0.5 * (20.0**2 + 12.0**2) * (1.0 / 24.0**2 + 1.0 / 40.0**2))
+    assert read.own_sd == pytest.approx(own / 1e3, rel=0.1)
     assert np.rad2deg(read.films["right_bending"].tilt[-1]) == pytest.approx(10.0, abs=0.3)
 
 

@@ -215,9 +215,10 @@ def test_films_are_asked_of_ratios_where_the_study_wants_it(
     monkeypatch.setattr(personalise, "FilmFit", Fit)
     monkeypatch.setattr(personalise, "regions", lambda *_: reach)
     monkeypatch.setattr(Fit, "arrived", arrived)
-    nothing: Any = None
+    patient: Any = SimpleNamespace(read=SimpleNamespace(traction={}))
     asked = study(film_regions=regions)
-    found, told = personalise._personal(asked, nothing, "tangent_fitted", TABLE)
+    found, told, absolute = personalise._personal(asked, patient, "tangent_fitted", TABLE)
+    assert absolute == ""
     assert found.by_films == (reach if regions else None)
     assert told == ("" if arrived else "the fit to the films did not settle")
 

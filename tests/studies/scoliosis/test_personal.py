@@ -11,8 +11,8 @@ import pytest
 from scoliosis_cases import STUDY, mirrored, shipped
 from sweeps import sweep
 
-from spinepipe.studies.scoliosis.film_fit import TOPS, FilmFit
-from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, PatientFilms
+from spinepipe.studies.scoliosis.film_fit import READINGS, FilmFit
+from spinepipe.studies.scoliosis.films import ERECT, LEFT, RIGHT, PatientFilms, film_sd
 from spinepipe.studies.scoliosis.fixed_end_spine import geometry, with_laws
 from spinepipe.studies.scoliosis.personal import (
     WAYS,
@@ -114,10 +114,10 @@ def test_models_say_how_much_they_take_from_the_films(patient: Patient) -> None:
 def test_a_mirrored_patient_has_the_mirrored_fit(patient: Patient) -> None:
     """The fit to films: ratios alike, ends exchanged, as many optima."""
     population = usual_population(patient.chain.n_joints)
-    one, other = (FilmFit(p, np.array([1e-3, 1e-3, 0.01])) for p in (patient, turned_over(patient)))
+    one, other = (FilmFit(p, film_sd(0.5, 0.4, 0.7, 0.3)) for p in (patient, turned_over(patient)))
     fits = one.fit(population), other.fit(population)
     assert fits[0].n_optima == fits[1].n_optima
     assert fits[0].cost == pytest.approx(fits[1].cost, rel=1e-3)
-    ratio, lower, upper = fits[0].unknowns[:-TOPS].reshape(3, -1)
+    ratio, lower, upper = fits[0].unknowns[:-READINGS].reshape(3, -1)
     turned = np.concatenate([ratio, upper, lower])
-    np.testing.assert_allclose(fits[1].unknowns[:-TOPS], turned, rtol=0, atol=0.01)
+    np.testing.assert_allclose(fits[1].unknowns[:-READINGS], turned, rtol=0, atol=0.01)

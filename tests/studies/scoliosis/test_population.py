@@ -3,6 +3,7 @@
 Would catch rounds that end too early or never, and spreads with the wrong prior.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,20 +13,18 @@ from scipy.stats import multivariate_normal
 from sweeps import sweep
 
 from spinepipe.progress import Progress
-from spinepipe.status import Status
 from spinepipe.studies.scoliosis import fit_population as learning
 from spinepipe.studies.scoliosis.film_fit import (
-    TOPS,
+    READINGS,
     FilmFit,
-    FilmFitResult,
     FilmInformation,
     _information,
     ends_of,
     laws_of,
     prior,
-    weighed_with,
 )
 from spinepipe.studies.scoliosis.film_regions import _of_films, by_ratio
+from spinepipe.studies.scoliosis.films import FilmSd, film_sd
 from spinepipe.studies.scoliosis.population import (
     PATIENT_SPREAD,
     PatientPrior,
@@ -33,6 +32,7 @@ from spinepipe.studies.scoliosis.population import (
     PopulationEstimate,
     population_of,
     population_rows,
+    unsure_means,
     update_population,
     usual_population,
 )
@@ -87,7 +87,7 @@ def moved(by: float) -> Any:
 def test_rounds_end_when_the_population_stands_still_or_after_twenty(
     by: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told = SimpleNamespace(information=None)
+    told = SimpleNamespace(information=SimpleNamespace(matrix=np.eye(6)))
     monkeypatch.setattr(learning, "patient_of", lambda *_: None)
     monkeypatch.setattr(learning, "FilmFit", lambda *_: None)
     monkeypatch.setattr(learning, "fit_alike", lambda *_: [told, None])
@@ -127,7 +127,9 @@ def test_a_table_tells_means_with_the_interval_of_patients() -> None:
     usual = usual_population(2)
     rows = list(
         population_rows(
-            PopulationEstimate(usual, 4, np.inf, 3, (), True), ("a", "b"), np.full(3, 0.002)
+            PopulationEstimate(usual, 4, np.inf, 3, (), True),
+            ("a", "b"),
+            FilmSd(np.full(3, 0.002), np.full(3, 0.001)),
         )
     )
     assert [(row["quantity"], row["joint"]) for row in rows] == [
@@ -151,18 +153,20 @@ def test_a_table_tells_means_with_the_interval_of_patients() -> None:
 
 def test_films_are_weighed_with_two_readings_and_the_model() -> None:
     """sqrt(2 x 3^2 + 1^2) mm and sqrt(2 x 2^2 + 1^2) deg."""
-    found = weighed_with(reading_mm=3.0, reading_deg=2.0, model_mm=1.0, model_deg=1.0)
-    np.testing.assert_allclose(found, [np.sqrt(19.0) / 1e3] * 2 + [np.deg2rad(3.0)])
+    found = film_sd(reading_mm=3.0, reading_deg=2.0, model_mm=1.0, model_deg=1.0)
+    np.testing.assert_allclose(found.vertebra, [np.sqrt(19.0) / 1e3] * 2 + [np.deg2rad(3.0)])
+    read = np.sqrt(2.0) * np.array([3e-3, 3e-3, np.deg2rad(2.0)])
+    np.testing.assert_allclose(found.frame, read)  # a model moves no frame
 
 
 def test_what_films_say_of_numbers_is_told_whatever_the_top_was() -> None:
     """Errors e + J (x - at) of unit SD and a top drawn about nothing with an SD of one: the same
     as a normal of all, of which the top is left out."""
     rng = np.random.default_rng(20200)
-    n = 3 + TOPS
+    n = 3 + READINGS
     slopes, errors, at = rng.normal(size=(20, n)), rng.normal(size=20), rng.normal(size=n)
     told = _information(errors, slopes, at)
-    of_top = np.diag([0.0] * 3 + [1.0] * TOPS)
+    of_top = np.diag([0.0] * 3 + [1.0] * READINGS)
     covariance = np.linalg.inv(slopes.T @ slopes + of_top)
     mean = covariance @ (slopes.T @ (slopes @ at - errors))
     np.testing.assert_allclose(np.linalg.inv(told.matrix), covariance[:3, :3])
@@ -178,8 +182,28 @@ def test_a_patient_of_a_population_is_between_the_films_and_the_population() -> 
     known = told.known(population)
     np.testing.assert_allclose(known.mean, population.mean + 0.75)
     np.testing.assert_allclose(known.covariance, np.linalg.inv(population.precision) / 4.0)
-    fitted = FilmFitResult(np.zeros(9), told, known, Status.CONVERGED, {}, 0.0, 1)
-    assert fitted.decided == pytest.approx(3.0 * 0.75)
+    assert told.decided(population) == pytest.approx(3.0 * 0.75)
+
+
+def test_means_that_films_leave_open_widen_what_is_known_of_a_patient() -> None:
+    """One number of a segment, by hand: films of no weight leave the spread and the mean's own
+    error; films of the population's own weight halve the way to the mean, and a quarter of its
+    error's variance is left."""
+    population = replace(usual_population(1), unsure=np.full(3, 0.5))
+    nothing = np.zeros((3, 3))
+    told = FilmInformation(nothing, np.zeros(3)).known(population)
+    np.testing.assert_allclose(np.diag(told.covariance), population.sd**2 + 0.25)
+    told = FilmInformation(population.precision, np.zeros(3)).known(population)
+    np.testing.assert_allclose(np.diag(told.covariance), population.sd**2 / 2.0 + 0.25 / 4.0)
+
+
+def test_means_are_the_surer_the_more_patients_tell() -> None:
+    """Ratios of patients whose films are exact: 1 / (1 / 0.3^2 + n / 0.4^2); none: 0.3."""
+    usual = usual_population(1)
+    exact = np.diag([1e9, 0.0, 0.0])
+    for n in (0, 1, 10):
+        found = unsure_means(usual, [exact] * n)[0]
+        assert found == pytest.approx((1.0 / (1.0 / 0.09 + n / 0.16)) ** 0.5, rel=1e-6)
 
 
 def test_ends_and_stiffness_at_rest_are_those_of_the_numbers() -> None:
@@ -214,13 +238,13 @@ def test_a_fit_begins_with_ends_beyond_what_the_films_show() -> None:
         expected = [9.0 * times, max(5.0, 3.0 * times), max(20.0, 6.0 * times), 0.1 * times]
         np.testing.assert_allclose(ends, expected)
         assert not guess[6:].any()
-        assert len(guess) == 6 + TOPS == 12
+        assert len(guess) == 6 + READINGS == 18
 
 
 def test_an_unfitted_patient_has_the_population_s_intervals() -> None:
     """Ratios are told about their mean: of two segments each with an SD of 0.4 / sqrt(2)."""
     fit = of_films([6.0, 6.0], [-6.0, -6.0])
-    fit.size, fit._model = 80.0, lambda numbers: "model"
+    fit.size, fit.model_of = 80.0, lambda numbers: "model"
     found = fit.unfitted(usual_population(2))
     reach = np.exp(1.959964 * 0.4 / np.sqrt(2.0))
     np.testing.assert_allclose(found.ratio_range, [[1.0 / reach] * 2, [reach] * 2], rtol=1e-6)
@@ -235,11 +259,11 @@ def test_a_profiled_ratio_is_drawn_to_nothing_and_all_else_to_the_population() -
     other numbers, but for what does not change."""
     population = usual_population(2)
     mean, sd, _ = prior(population)
-    np.testing.assert_allclose(mean, [*population.mean, *np.zeros(TOPS)])
-    np.testing.assert_allclose(sd, [*population.sd, *np.ones(TOPS)])
+    np.testing.assert_allclose(mean, [*population.mean, *np.zeros(READINGS)])
+    np.testing.assert_allclose(sd, [*population.sd, *np.ones(READINGS)])
     nothing = np.zeros(0)
     fit: Any = SimpleNamespace(missed=lambda unknowns: (nothing, np.zeros((0, len(unknowns)))))
-    numbers = by_ratio(2, 6 + TOPS, 0)
+    numbers = by_ratio(2, 6 + READINGS, 0)
     point = _of_films(fit, population, 0, numbers)
     covariance = np.linalg.inv(population.precision)
     kept = np.array([1, 2, 3, 4, 5])
@@ -249,9 +273,9 @@ def test_a_profiled_ratio_is_drawn_to_nothing_and_all_else_to_the_population() -
     for _ in range(3):
         unknowns = mean + rng.normal(0.0, 0.1, len(mean))
         errors, slopes = point(np.linalg.solve(numbers, unknowns))
-        top = unknowns[-TOPS:]
+        top = unknowns[-READINGS:]
         costs.append(errors @ errors - top @ top + 2.0 * density.logpdf(unknowns[kept]))
-        assert slopes.shape == (len(errors), 6 + TOPS)
+        assert slopes.shape == (len(errors), 6 + READINGS)
     np.testing.assert_allclose(costs, costs[0])
 
 
@@ -299,13 +323,16 @@ def test_patients_who_are_known_exactly_give_their_population_back() -> None:
 
 
 def test_a_population_comes_back_from_its_table() -> None:
-    population, sd = made(), np.array([1.1e-3, 1.1e-3, 0.01])
+    population = replace(made(), unsure=np.linspace(0.1, 0.3, 3 * SEGMENTS))
+    sd = FilmSd(np.array([1.1e-3, 1.1e-3, 0.01]), np.array([1e-3, 1e-3, 0.02]))
     told = PopulationEstimate(population, 3, 0.01, 7, ("p05",), True)
     rows = from_rows(POPULATION, list(population_rows(told, JOINTS, sd))).to_pandas()
     found, weights = population_of(rows)
     np.testing.assert_allclose(found.mean, population.mean, atol=1e-12)
     assert (found.ratio_sd, found.end_sd) == (population.ratio_sd, population.end_sd)
-    np.testing.assert_allclose(weights, sd, rtol=1e-12)
+    np.testing.assert_allclose(found.unsure, population.unsure)
+    np.testing.assert_allclose(weights.vertebra, sd.vertebra, rtol=1e-12)
+    np.testing.assert_allclose(weights.frame, sd.frame, rtol=1e-12)
     assert set(rows["message"]) == {"without p05: no fit"}
     within = (rows["low"] < rows["mean"]) & (rows["mean"] < rows["high"])
     assert within.all()

@@ -151,6 +151,13 @@ def study(
     return {**errors_in(errors), "accuracy": read_to(noise), "statistics": statistics} | tables
 
 
+def pulled(mean: float | None) -> dict[str, pd.DataFrame]:
+    """What known traction tells of one spine."""
+    columns = ("mean_nm_per_deg", "mean_low", "mean_high")
+    row = {"specimen": "p01"} | dict.fromkeys(columns, mean)
+    return {"absolute_stiffness": pd.DataFrame([row])}
+
+
 NINE = {law: [e + 0.01 * n for n in range(9)] for law, e in (("tangent", 1.0), ("uniform", 2.0))}
 TWO = {name: each[:2] for name, each in FIRST.items()}
 UNLIKE = {**FIRST, "tangent": [0.9, 1.0, LOST]}
@@ -188,6 +195,8 @@ STUDIES: list[tuple[str, dict[str, pd.DataFrame]]] = [
     ("ratios:all fits:ok bounds:ok constrained:ok opposite:ok", law_rows()),
     ("ratios:some", law_rows(identifiable=[False])),
     ("ratios:none", law_rows(identifiable=[False] * 10)),
+    ("size:told", pulled(4.0)),
+    ("size:none", pulled(None)),
     ("fits:check_several", law_rows(n_optima=[2])),
     ("fits:check", law_rows(n_optima=[2], fit_status=GAVE_UP)),
     ("fits:check", law_rows(fit_status=GAVE_UP * 2)),
