@@ -166,7 +166,8 @@ def _load_rows(outcome: TaskOutcome) -> Iterator[Row]:
     least = outcome.held.least_pa if outcome.held else None
     of_all = {"least_stress_mpa": least and 1e-6 * least, "message": outcome.message}
     for row in level_rows(outcome):
-        own = {"pressure_mpa": 1e-6 * pressure.pa} if row["level"] == LEVELS[L4L5] else {}
+        own = {"pressure_mpa": 1e-6 * pressure.pa, "inside_eq_6": bool(pressure.inside)}
+        own = own if row["level"] == LEVELS[L4L5] else {}
         yield row | of_all | own
 
 
