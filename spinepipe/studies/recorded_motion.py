@@ -21,7 +21,7 @@ from spinepipe.studies.recordings import (
     STANCE,
     TRIALS,
     Row,
-    of_specimen,
+    of_trial,
     read_recording,
     static_trial,
     trial_rows,
@@ -123,23 +123,21 @@ def lifted_load(
         return None
     rate = 1.0 / float(np.mean(np.diff(time_s)))
     at = np.mean([places[name] for name in HANDS], axis=0)
-    box = _of_trial(cohort, BOX.stem, specimen, str(row["trial"]))
+    box = of_trial(cohort, BOX, specimen, str(row["trial"]))
     borne = np.ones(len(time_s))
     for axis, column in enumerate(("x_mm", "y_mm", "z_mm")):
-        if box is None or box[column].isna().all():
+        if box[column].isna().all():
             continue
         measured = _on_clock(cohort, BOX.file, box, column, time_s) / MM_PER_M
         at[:, axis] = low_pass(measured, rate, cutoff_hz)
         if column == "y_mm":
             borne = borne_by_height(at[:, axis])
-    plates = _of_trial(cohort, FORCE_PLATES.stem, specimen, str(row["trial"]))
-    if plates is not None:
-        upwards = {
-            str(name): _on_clock(cohort, FORCE_PLATES.file, one, "fy_n", time_s)
-            for name, one in plates.groupby("plate", sort=False)
-        }
-        told = borne_by_plates(kg, upwards)
-        kg, borne = (kg, borne) if told is None else told
+    plates = of_trial(cohort, FORCE_PLATES, specimen, str(row["trial"]))
+    upwards = {
+        str(name): _on_clock(cohort, FORCE_PLATES.file, one, "fy_n", time_s)
+        for name, one in plates.dropna(subset="fy_n").groupby("plate", sort=False)
+    }
+    kg, borne = borne_by_plates(kg, upwards) or (kg, borne)
     return LiftedLoad(kg, at, borne)
 
 
@@ -177,15 +175,6 @@ def _lacking(file: str, read: MarkerRecording, at: Mapping[str, int]) -> Iterato
             found = "never in sight" if name in at else "no such marker"
             allowed = f"all markers of Plug-in-Gait above the legs: {', '.join(NEEDED)}"
             yield InputProblem(file, None, name, found, allowed, "correct its name in the file")
-
-
-def _of_trial(cohort: Cohort, table: str, specimen: str, trial: str) -> pd.DataFrame | None:
-    """Rows of a table of a trial; None where there are none."""
-    if table not in cohort.further:
-        return None
-    rows = of_specimen(cohort.further[table], specimen)
-    rows = rows[rows["trial"] == trial]
-    return rows if len(rows) else None
 
 
 def _on_clock(cohort: Cohort, file: str, rows: pd.DataFrame, column: str, time_s: Array) -> Array:

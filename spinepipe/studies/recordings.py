@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.form import read_forms
+from spinepipe.documents.form import TableForm, read_forms
 from spinepipe.motion.reading import DEFAULT_AXES, NoFrameError, read_motion
 from spinepipe.motion.recording import MarkerRecording
 from spinepipe.problems import InputError, InputProblem
@@ -39,6 +39,14 @@ def trial_rows(cohort: Cohort, specimen: str) -> tuple[Row, ...]:
     """Rows of `trials.csv`, with the line of each as `line`."""
     rows = of_specimen(cohort.further[TRIALS.stem], specimen)
     return tuple(rows.assign(line=rows.index).to_dict("records"))
+
+
+def of_trial(cohort: Cohort, form: TableForm, specimen: str, trial: str) -> pd.DataFrame:
+    """The rows of a trial in a table of the cohort; none of a table that it has not."""
+    if form.stem not in cohort.further:
+        return pd.DataFrame(columns=list(form.names))
+    rows = of_specimen(cohort.further[form.stem], specimen)
+    return rows[rows["trial"] == trial]
 
 
 def motion_files(cohort: Cohort, specimen: str) -> tuple[Path, ...]:
