@@ -84,6 +84,19 @@ def smooth_places(row: Row, cohort: Cohort, cutoff_hz: float) -> tuple[Array, di
         Of frames that cannot be filtered, besides what `places_of` raises.
     """
     time_s, raw = places_of(row, cohort)
+    return time_s, smoothed(row, cohort, time_s, raw, cutoff_hz)
+
+
+def smoothed(
+    row: Row, cohort: Cohort, time_s: Array, raw: Mapping[str, Array], cutoff_hz: float
+) -> dict[str, Array]:
+    """Places (F, 3) m of the markers of a trial, filtered.
+
+    Raises
+    ------
+    InputError
+        Of frames that cannot be filtered.
+    """
     table = f"{cohort.name}/{TRIALS.file}"
     steps = np.diff(time_s)
     if len(steps) == 0 or np.ptp(steps) > EVEN * steps.mean():
@@ -92,12 +105,11 @@ def smooth_places(row: Row, cohort: Cohort, cutoff_hz: float) -> tuple[Array, di
         raise InputError([InputProblem(table, row["line"], "file", found, allowed, remedy)])
     rate = 1.0 / float(steps.mean())
     try:
-        places = {name: low_pass(at, rate, cutoff_hz) for name, at in raw.items()}
+        return {name: low_pass(at, rate, cutoff_hz) for name, at in raw.items()}
     except ValueError as why:
         allowed, remedy = "a trial that can be filtered", "record longer, or lower the cutoff"
         problem = InputProblem(table, row["line"], "file", str(why), allowed, remedy)
         raise InputError([problem]) from why
-    return time_s, places
 
 
 def lifted_load(
@@ -150,8 +162,13 @@ def places_of(row: Row, cohort: Cohort) -> tuple[Array, dict[str, Array]]:
         Of a file that cannot be read, or that lacks markers.
     """
     read = read_recording(row, cohort.name, cohort.folder)
+    return read.time_s, places_in(read, f"{cohort.name}/{row['file']}")
+
+
+def places_in(read: MarkerRecording, file: str) -> dict[str, Array]:
+    """The same places of a recording; `file`: its name in messages."""
     at = marker_places(read.names)
-    lacking = list(_lacking(f"{cohort.name}/{row['file']}", read, at))
+    lacking = list(_lacking(file, read, at))
     if lacking:
         raise InputError(lacking)
     found = {}
@@ -165,7 +182,7 @@ def places_of(row: Row, cohort: Cohort) -> tuple[Array, dict[str, Array]]:
                 ],
                 axis=1,
             )
-    return read.time_s, found
+    return found
 
 
 def _lacking(file: str, read: MarkerRecording, at: Mapping[str, int]) -> Iterator[InputProblem]:

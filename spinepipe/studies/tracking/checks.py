@@ -12,11 +12,9 @@ import numpy as np
 
 from spinepipe.cohort import Cohort
 from spinepipe.documents.form import TableForm
-from spinepipe.documents.inside import outside
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
 from spinepipe.motion.recorded_motion import RIGID_FROM
 from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.skeleton import BODIES, MarkerSet
@@ -26,9 +24,9 @@ from spinepipe.studies.checks_of_markers import LoadedTrial
 from spinepipe.studies.checks_of_motion import motion_problems
 from spinepipe.studies.checks_of_recorded import recorded_problems
 from spinepipe.studies.places import unknown_names
-from spinepipe.studies.recordings import STANCE, TRIALS, read_recording, static_trial, trial_rows
+from spinepipe.studies.recordings import TRIALS, read_recording, row_problems, trial_rows
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
-from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in, trial_of
+from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
 from spinepipe.studies.tracking.trials import MARKER_SET, PASSIVE, RATIOS, source_kinds
 from spinepipe.units import COORDINATES, ROTATIONS
@@ -201,32 +199,6 @@ def _bodies(cohort: Cohort) -> Iterator[InputProblem]:
             yield InputProblem(file, None, "mass_kg", found, allowed, "correct the masses")
 
 
-def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
-    """Faults of files and axes in `trials.csv`; persons without a trial that tells their size."""
-    file = f"{cohort.name}/{TRIALS.file}"
-    for specimen in cohort.specimen_names:
-        for row in trial_rows(cohort, specimen):
-            name, place = str(row["file"]), (file, row["line"], "file")
-            if Path(name).suffix.lower() not in READERS:
-                found, allowed = f"'{name}'", f"a file of motion: {', '.join(READERS)}"
-                yield InputProblem(*place, found, allowed, "export it as one of these")
-            if isinstance(row["axes"], str):
-                try:
-                    axes_of(row["axes"])
-                except ValueError as error:
-                    allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
-                    remedy = "name each axis once, a minus where it points the other way"
-                    yield InputProblem(file, row["line"], "axes", str(error), allowed, remedy)
-            # a file outside the cohort's folder, by .. or by a link
-            if (led_out := outside(cohort.folder / name, cohort.folder, place, name)) is not None:
-                yield led_out
-        if static_trial(cohort, specimen) is None:
-            found = f"no static trial of '{specimen}'"
-            allowed = f"a trial of kind {STANCE}, or one marked static"
-            remedy = "add it: without it nobody's size is known"
-            yield InputProblem(file, None, "kind", found, allowed, remedy)
-
-
 def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
     """Everything that is wrong with files of motion, of a cohort whose tables are sound."""
     for specimen in cohort.specimen_names:
@@ -241,8 +213,7 @@ def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
             except InputError as error:
                 yield from error.problems
                 continue
-            file = f"{cohort.name}/{row['file']}"
-            yield from _missing_markers(file, markers, read)
+            yield from _missing_markers(f"{cohort.name}/{row['file']}", markers, read)
             # the trial is looked at with the markers that its file has
             kept = np.flatnonzero([name in read.names for name in markers.names])
             if not len(kept):
@@ -254,10 +225,7 @@ def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
                 markers.weight[kept],
                 tuple(markers.cluster[k] for k in kept),
             )
-            axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
-            places = (file, f"{cohort.name}/{TRIALS.file}", row["line"], read.first)
-            trial = trial_of(row, part, read)
-            yield from motion_problems(LoadedTrial(trial, part, neutral[kept], axes, *places))
+            yield from motion_problems(LoadedTrial.of(cohort, row, read, part, neutral[kept]))
 
 
 def _missing_markers(
