@@ -101,12 +101,16 @@ def hold_task(
     now = replace(now, least_pa=_least_pa(asked, options))
     if done:
         return now
-    best, too_little, solves = None, 0.0, 1
+    best, unsettled, too_little, solves = None, None, 0.0, 1
     while solves < _MOST_SOLVES:
         stress = np.inf if now.least_pa is None else _ABOVE_LEAST * now.least_pa
-        if _is_held(now, options):
+        # so near the least stress hardly any forces will do, and rounds may swing: a little more is
+        # tried then
+        held = _is_held(now, options)
+        if held and (now.solved is asked or now.solved.status is Balanced.CONVERGED):
             best = now
         else:
+            unsettled = now if held else unsettled
             too_little = now.task.stress_pa
             if stress > _FAR * HIGHEST_PA:
                 break
@@ -114,6 +118,7 @@ def hold_task(
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
             break
         now, solves = _at(person, task, stress, options, now), solves + 1
+    best = best or unsettled
     if best is None:
         return replace(_not_held(now, person, task), solves=solves)
     takes = min(best.task.stress_pa, best.least_pa or np.inf)

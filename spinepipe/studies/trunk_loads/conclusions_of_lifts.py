@@ -69,7 +69,9 @@ def _largest(found: list[LargestLoad], loads: pd.DataFrame, alone: bool) -> Iter
     newtons = float(most.row["compression_n"])
     load = Value(newtons, "N", source=_SOURCE)
     if most.band:
-        ends, n = (float(most.band["low"]), float(most.band["high"])), int(most.band["n_samples"])
+        low, high = most.band["low"], most.band["high"]
+        ends = float(low), None if pd.isna(high) else float(high)
+        n = int(most.band["n_samples"] + most.band["n_failed"])
         load = Value(newtons, "N", *ends, n, f"{_SOURCE}; lift_bands")
     apart = float(round(100.0 * (newtons / GUIDELINE_N - 1.0)))
     values = {
@@ -128,6 +130,6 @@ def _bands(bands: pd.DataFrame) -> Iterator[Conclusion]:
         return
     lost, n = int(rows["n_failed"].sum()), int((rows["n_failed"] + rows["n_samples"]).sum())
     values = numbers_from("lift_bands", lost=lost, samples=n)
-    values |= numbers_from("lift_bands", frames=len(rows), without=int(rows["low"].isna().sum()))
-    verdict = "stop" if rows["low"].isna().any() else "check" if lost else "ok"
+    values |= numbers_from("lift_bands", frames=len(rows), without=int(rows["high"].isna().sum()))
+    verdict = "check_open" if rows["high"].isna().any() else "check" if lost else "ok"
     yield Conclusion("lift_bands", verdict, values)

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
@@ -20,7 +21,7 @@ from spinepipe.motion.recorded_motion import RecordedMotion
 from spinepipe.motion.standing_spine import standing_spine
 from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.strength import HeldTask, hold_task
+from spinepipe.muscles.strength import HeldTask, Least, hold_task
 from spinepipe.muscles.task import Instant, Task
 from spinepipe.muscles.trunk import BODIES, LEVELS, body_of
 from spinepipe.progress import Progress
@@ -36,9 +37,8 @@ from spinepipe.studies.trunk_loads.persons import (
 )
 from spinepipe.studies.trunk_loads.postures import between, shares
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, level_rows, path_rows
-from spinepipe.studies.trunk_loads.sampling import values_at
+from spinepipe.studies.trunk_loads.sampling import censored_quantile, values_at
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.spread import LEAST_SAMPLES, MOST_FAILED
 from spinepipe.studies.trunk_loads.tables import LIFT_BANDS, LIFT_FRAMES, LIFT_LOADS, LIFT_PATHS
 from spinepipe.tables import from_rows, write
 from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
@@ -86,7 +86,7 @@ def rows_of(
 ) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
     asked, options = settings.motions, solver_options(settings)
-    frames = np.arange(0, len(motion.time_s), asked.every)
+    frames = np.arange(0, len(motion.time_s), asked.every, dtype=np.int64)
     tasks = tasks_of(motion, frames, 1e6 * asked.largest_stress_mpa)
     person, found = stands.person, dict[str, list[Row]]()
     outcomes = [
@@ -112,7 +112,10 @@ def rows_of(
 
 
 def tasks_of(
-    motion: RecordedMotion, frames: Array, stress_pa: float, values: Values | None = None
+    motion: RecordedMotion,
+    frames: NDArray[np.int64],
+    stress_pa: float,
+    values: Values | None = None,
 ) -> list[Task]:
     """Frames of a motion as tasks.
 
@@ -152,12 +155,12 @@ def tasks_of(
 
 
 def held_in_turn(
-    person: Person, tasks: Sequence[Task], options: SolverOptions
+    person: Person, tasks: Sequence[Task], options: SolverOptions, least: Least = "of_posture"
 ) -> Iterator[HeldTask]:
     """Tasks that follow each other closely, each begun where the one before ended."""
     before = None
     for task in tasks:
-        held = hold_task(person, task, options, nearby=before)
+        held = hold_task(person, task, options, least, before)
         before = held.solved
         yield held
 
@@ -174,7 +177,7 @@ def _load_rows(outcome: TaskOutcome) -> Iterator[Row]:
 
 
 def _frame_rows(
-    motion: RecordedMotion, frames: Array, outcomes: Sequence[TaskOutcome]
+    motion: RecordedMotion, frames: NDArray[np.int64], outcomes: Sequence[TaskOutcome]
 ) -> Iterator[Row]:
     names = motion.loads.names
     lifted = names.index(LIFTED) if LIFTED in names else None
@@ -189,15 +192,16 @@ def _frame_rows(
 
 def _compression(solved: SolvedTask | None) -> float:
     """N, of L4L5; of frames that are not held nought."""
-    held = solved is not None and solved.status in HELD
-    return float(solved.compression[L4L5]) if held else 0.0
+    if solved is None or solved.status not in HELD:
+        return 0.0
+    return float(solved.compression[L4L5])
 
 
 def _samples(
     settings: TrunkLoads,
     stands: UprightPerson,
     motion: RecordedMotion,
-    frames: Array,
+    frames: NDArray[np.int64],
     progress: Progress,
 ) -> tuple[Array, Array]:
     """(S, N, 7) N compression of persons drawn by the uncertain inputs, and (S, N) whether held."""
@@ -212,7 +216,7 @@ def _samples(
         person = stands.varied(values)
         sized = of_mass(motion, person.subject.mass_kg / stands.subject.mass_kg)
         tasks = tasks_of(sized, frames, 1e6 * asked.largest_stress_mpa, values)
-        solved = [one.solved for one in held_in_turn(person, tasks, options)]
+        solved = [one.solved for one in held_in_turn(person, tasks, options, "untold")]
         found.append([one.compression for one in solved])
         held.append([one.status in HELD for one in solved])
     shape = (len(found), len(frames))
@@ -235,11 +239,8 @@ def band_rows(times: Array, compression: Array, held: Array) -> Iterator[Row]:
     for k, time in enumerate(times.tolist()):
         good = compression[held[:, k], k]
         lost = len(held) - len(good)
-        enough = len(good) >= LEAST_SAMPLES and lost <= MOST_FAILED * len(held)
         for level, name in enumerate(LEVELS):
-            ends = (
-                np.quantile(good[:, level], [0.025, 0.5, 0.975]).tolist() if enough else [None] * 3
-            )
+            ends = [censored_quantile(good[:, level], lost, p) for p in (0.025, 0.5, 0.975)]
             yield {
                 "time_s": time,
                 "level": name,

@@ -46,23 +46,22 @@ def lift_scenes(tables: Tables) -> list[Scene]:
     several = len({specimen for specimen, _ in lifts}) > 1
     found = []
     for specimen, trial in lifts:
-        own = [
-            of_lift(tables[name], specimen, trial)
-            for name in ("lift_loads", "lift_frames", "lift_paths")
-        ]
+        own = {
+            name: of_lift(tables[f"lift_{name}"], specimen, trial)
+            for name in ("loads", "frames", "paths")
+        }
         title = f"{specimen}, {plain(trial)}" if several else capital(plain(trial))
-        found.append(_scene(title, *own, (top_mpa, top_n), caption))
+        found.append(_scene(title, own, (top_mpa, top_n), caption))
     return found
 
 
 def _scene(
     title: str,
-    loads: pd.DataFrame,
-    frames: pd.DataFrame,
-    paths: pd.DataFrame,
+    own: dict[str, pd.DataFrame],
     top: tuple[float, float],
     caption: str,
 ) -> Scene:
+    loads, frames, paths = own.values()
     top_mpa, top_n = top
     by_time = dict(iter(loads.groupby("time_s")))
     borne = frames.set_index("time_s")
@@ -86,18 +85,18 @@ def _scene(
                 muscles=muscle_lines(lines.get(time, paths.iloc[:0]), top_mpa),
             )
         )
-    own = loads[loads["level"] == L4L5].sort_values("time_s")
+    course_of = loads[loads["level"] == L4L5].sort_values("time_s")
     course = Course(
-        own["time_s"].to_numpy(float),
-        own["compression_n"].to_numpy(float),
+        course_of["time_s"].to_numpy(float),
+        course_of["compression_n"].to_numpy(float),
         paths["time_s"].unique().astype(float),
-        f"compression of L4–L5, up to {newton(float(own['compression_n'].max()))}",
+        f"compression of L4–L5, up to {newton(float(course_of['compression_n'].max()))}",
     )
     return Scene(title, "Time", bodies or (), steps, caption, pause_ms=140, course=course)
 
 
 def _says(time_s: float, rows: pd.DataFrame, frame: pd.Series) -> str:
-    load = newton(float(rows.loc[L4L5, "compression_n"]))
+    load = newton(float(rows["compression_n"].to_numpy(float)[LEVELS.index(L4L5)]))
     newtons = float(frame["load_n"])
     hands = f", hands bear {newton(newtons)}" if newtons > LEAST_BORNE_N else ""
     ended = ENDED.get(str(rows["status"].iloc[0]))

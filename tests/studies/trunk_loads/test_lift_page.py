@@ -64,7 +64,7 @@ def tables(
                 )
                 told_of = {"low": 0.9 * newtons, "median": newtons, "high": 1.1 * newtons}
                 if failed > 20:
-                    told_of = dict.fromkeys(told_of)
+                    told_of["high"] = None
                 sampled.append(own | told_of | {"n_samples": 100 - failed, "n_failed": failed})
     made = {"lift_loads": loads, "lift_frames": frames, "lift_bands": sampled if bands else []}
     return {name: pd.DataFrame(of, columns=NAMED[name].names) for name, of in made.items()}
@@ -77,7 +77,7 @@ CASES: Mapping[str, tuple[Mapping[str, pd.DataFrame], bool]] = {
     "lift open|lift_held stop": (tables(lost=(1.0,)), True),
     "lift none|lift_held stop": (tables(lost=TIMES), True),
     "lift above|lift_range all|lift_bands check": (tables(trials=3, failed=5), True),
-    "lift_bands stop": (tables(failed=40), True),
+    "lift_bands check_open": (tables(failed=40), True),
     "lift_too above|lift_methods sampled": (tables(), False),
     "lift_too below": (tables(3000.0), False),
     "lift_too open": (tables(lost=(1.0,)), False),
