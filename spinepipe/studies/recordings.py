@@ -129,5 +129,5 @@ def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
         if static_trial(cohort, specimen) is None:
             found = f"no static trial of '{specimen}'"
             allowed = f"a trial of kind {STANCE}, or one marked static"
-            remedy = "add one in which the person stands upright, or mark one static"
+            remedy = "add it, the person standing upright, or mark one static"
             yield InputProblem(file, None, "kind", found, allowed, remedy)

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.form import TableForm
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.points import marker_places
@@ -23,7 +22,7 @@ from spinepipe.problems import InputError, InputProblem, Spelling, one_of
 from spinepipe.studies.checks_of_markers import LoadedTrial
 from spinepipe.studies.checks_of_motion import motion_problems
 from spinepipe.studies.checks_of_recorded import recorded_problems
-from spinepipe.studies.places import unknown_names
+from spinepipe.studies.places import lacking_tables, unknown_names
 from spinepipe.studies.recordings import TRIALS, read_recording, row_problems, trial_rows
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
 from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in
@@ -101,9 +100,7 @@ def check_recordings(
 def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
     """Tables that every study of tracked motions needs, and the chain of joints from S1 to T1."""
     place = document.place_of("cohort")
-    for form in NEEDED:
-        if form.stem not in cohort.further:
-            yield _without(document, form)
+    yield from lacking_tables(document, NEEDED, cohort)
     if not cohort.has_frames:
         found, allowed = "a cohort without joints", "a cohort with joints.csv or landmarks.csv"
         yield InputProblem(*place, found, allowed, "tell where the joints are")
@@ -118,9 +115,7 @@ def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
 
 def _lifts(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:
     """What a study of markers of Plug-in-Gait needs: persons, trials, and ratios that there are."""
-    for form in (SUBJECTS, TRIALS):
-        if form.stem not in cohort.further:
-            yield _without(document, form)
+    yield from lacking_tables(document, (SUBJECTS, TRIALS), cohort)
     try:
         sets = ratios_of(cohort)
     except InputError as error:
@@ -142,12 +137,6 @@ def _source(document: YamlDocument) -> Iterator[InputProblem]:
     except NoSource as error:
         allowed = f"{PACKAGE} in version {VERSION}"
         yield InputProblem(*document.place_of("marker_set"), error.found, allowed, REMEDY)
-
-
-def _without(document: YamlDocument, form: TableForm) -> InputProblem:
-    found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
-    remedy = f"add {form.file}, or name another cohort"
-    return InputProblem(*document.place_of("cohort"), found, allowed, remedy)
 
 
 def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:

@@ -19,7 +19,7 @@ from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import InputError, InputProblem, Spelling, did_you_mean, one_of
 from spinepipe.studies.checks_of_recorded import recorded_problems
-from spinepipe.studies.places import unknown_names
+from spinepipe.studies.places import lacking_tables, unknown_names
 from spinepipe.studies.plausibility import subject_doubts
 from spinepipe.studies.recordings import TRIALS, row_problems
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
@@ -45,11 +45,7 @@ def check_trunk(
     """Everything that is wrong with the subjects, tasks and muscles of a cohort."""
     further = cohort.further
     needed = (SUBJECTS, TRIALS) if study.motions.trials else (SUBJECTS, TASKS)
-    for form in needed:
-        if form.stem not in further:
-            found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
-            remedy = f"add {form.file}, or name another cohort"
-            yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
+    yield from lacking_tables(document, needed, cohort)
     if "subjects" in further:
         yield from subject_problems(cohort, further["subjects"])
     if "tasks" in further:
