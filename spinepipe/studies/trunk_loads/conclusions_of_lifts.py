@@ -92,7 +92,8 @@ def _largest(found: list[LargestLoad], loads: pd.DataFrame, alone: bool) -> Iter
     if not alone or side == "open":
         return
     pressure = Value(float(most.row["pressure_mpa"]), "MPa", source="lift_loads: pressure_mpa")
-    yield Conclusion("lift_pressure", "most", {"value": pressure}, names)
+    inside = "inside" if most.row["inside_eq_6"] else "beyond"
+    yield Conclusion("lift_pressure", inside, {"value": pressure}, names)
     if most.after_s is not None:
         verdict = "after" if most.after_s >= 0.0 else "before"
         when = Value(round(abs(most.after_s), 2), "s", source="lift_frames: load_n")

@@ -35,13 +35,13 @@ from spinepipe.studies.trunk_loads.persons import (
     extra_inputs,
     solver_options,
 )
-from spinepipe.studies.trunk_loads.postures import between, shares
+from spinepipe.studies.trunk_loads.postures import between
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, level_rows, path_rows
 from spinepipe.studies.trunk_loads.sampling import censored_quantile, values_at
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import LIFT_BANDS, LIFT_FRAMES, LIFT_LOADS, LIFT_PATHS
 from spinepipe.tables import from_rows, write
-from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 LIFTED = "load"
 """Part of a recorded motion that is no part of the body."""
@@ -69,16 +69,10 @@ def run(root: str, study: str, specimen: str, trial: str, **paths: str) -> None:
 
 
 def lift_of(cohort: Cohort, specimen: str, trial: str, person: Person) -> RecordedMotion:
-    """A recorded lift of the spine whose joints and slices the muscles hold.
-
-    Joints share what the trunk bends against the pelvis as they do in tasks: ligaments, which are
-    steep at the end of a joint's range, are made for that.
-    """
-    trunk, sharing = person.lines.trunk, np.zeros((len(skeleton.JOINTS), len(ROTATIONS)))
-    for column, axis in enumerate(ROTATIONS):
-        sharing[: len(LEVELS), column] = shares(axis)
-    spine = standing_spine(person.subject, trunk, person.chain, person.upright, person.masses)
-    return recorded_motion(cohort, specimen, trial, spine, shares=sharing)
+    """A recorded lift of the spine whose joints and slices the muscles hold."""
+    trunk, upright = person.lines.trunk, person.upright
+    spine = standing_spine(person.subject, trunk, person.chain, upright, person.masses)
+    return recorded_motion(cohort, specimen, trial, spine)
 
 
 def rows_of(
@@ -172,7 +166,8 @@ def _load_rows(outcome: TaskOutcome) -> Iterator[Row]:
     least = outcome.held.least_pa if outcome.held else None
     of_all = {"least_stress_mpa": least and 1e-6 * least, "message": outcome.message}
     for row in level_rows(outcome):
-        own = {"pressure_mpa": 1e-6 * pressure.pa} if row["level"] == LEVELS[L4L5] else {}
+        own = {"pressure_mpa": 1e-6 * pressure.pa, "inside_eq_6": bool(pressure.inside)}
+        own = own if row["level"] == LEVELS[L4L5] else {}
         yield row | of_all | own
 
 

@@ -19,15 +19,14 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.facts import number, numbers, several
+from spinepipe.motion.joint_tables import USUAL_SHARES, ratio_sets
 from spinepipe.muscles.task import Exertion, Hands, Task
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.studies.trunk_loads.forms import FORCE, HANDS, PUSH_N, PUSH_NM, TASKS, UPRIGHT, turn
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
 from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
 
-FLEXION_PERCENT = numbers(__name__, "flexion_percent")
-LATERAL_PERCENT = numbers(__name__, "lateral_percent")
-"""L5S1 to T11T12."""
+_SHARES = ratio_sets()[USUAL_SHARES][: len(BODIES) - 1]
 
 _LARGEST = numbers(__name__, "largest_bend")
 THORAX_DEG = _LARGEST["thorax"]
@@ -52,9 +51,8 @@ USUAL_VERTEBRA = "T9"
 
 def shares(axis: str) -> Array:
     """(7,) share of each level in the rotation between pelvis and trunk, L5S1 to T11T12."""
-    percent = np.array([*(FLEXION_PERCENT if axis == "extension" else LATERAL_PERCENT).values()])
-    found: Array = percent / percent.sum()
-    return found
+    found: Array = _SHARES[:, ROTATIONS.index(axis)]
+    return found / found.sum()
 
 
 def between(pelvis: float, trunk: float, axis: str) -> Array:

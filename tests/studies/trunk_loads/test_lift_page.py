@@ -53,6 +53,7 @@ def tables(
                         "shear_right_n": 0.0,
                         "required_extension_nm": 0.05 * newtons,
                         "pressure_mpa": 1e-3 * newtons,
+                        "inside_eq_6": newtons < 3700.0,
                         "least_stress_mpa": 0.3,
                         "status": "beyond_strength"
                         if weak
@@ -71,7 +72,7 @@ def tables(
 
 
 CASES: Mapping[str, tuple[Mapping[str, pd.DataFrame], bool]] = {
-    "lift above|lift_limit above|lift_time after|lift_pressure most|lift_held ok|lift_bands ok"
+    "lift above|lift_limit above|lift_time after|lift_pressure beyond|lift_held ok|lift_bands ok"
     "|lift_methods alone_sampled": (tables(), True),
     "lift below|lift_limit below|lift_time before": (tables(3000.0, off=1.2), True),
     "lift open|lift_held stop": (tables(lost=(1.0,)), True),
