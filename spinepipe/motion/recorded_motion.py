@@ -73,7 +73,6 @@ class RecordedMotion:
     name : of the trial. time_s : (F,).
     l5s1 : (F, 3) m, centre of the disc. joints : (F, 17, 3) m, as `JOINTS`; all in ground.
     rotations : (F, 18, 3, 3) of `BODIES` in ground: how far each is turned from standing upright.
-    standing : (18, 3, 3) the same in the stance trial, where it is none.
     loads : with inertia. still : at the same places as if nothing were accelerated.
     lift_off_s : when hands bear half of what they lift; None where they do so all the time.
     """
@@ -83,7 +82,6 @@ class RecordedMotion:
     l5s1: Array
     joints: Array
     rotations: Array
-    standing: Array
     loads: CarriedLoads
     still: CarriedLoads
     lift_off_s: float | None = None
@@ -140,9 +138,8 @@ def move(
         *_arms(spine.subject, places, step_s),
     ]
     loads, still = carried_loads(parts, load, step_s)
-    standing = np.broadcast_to(np.eye(3), (len(BODIES), 3, 3))
     lift_off = None if load is None or load.lift_off is None else float(time_s[load.lift_off])
-    return RecordedMotion(name, time_s, l5s1, joints, bodies, standing, loads, still, lift_off)
+    return RecordedMotion(name, time_s, l5s1, joints, bodies, loads, still, lift_off)
 
 
 def shared_rotations(pelvis: Array, thorax: Array, shares: Array) -> Array:
