@@ -19,9 +19,9 @@ from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import InputError, InputProblem, Spelling, did_you_mean, one_of
 from spinepipe.studies.checks_of_recorded import recorded_problems
-from spinepipe.studies.places import unknown_names
+from spinepipe.studies.places import lacking_tables, unknown_names
 from spinepipe.studies.plausibility import subject_doubts
-from spinepipe.studies.recordings import STANCE, TRIALS, static_trial
+from spinepipe.studies.recordings import TRIALS, row_problems
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
 from spinepipe.studies.trunk_loads.forms import MUSCLE_PARAMETERS, MUSCLES, TASKS
@@ -45,11 +45,7 @@ def check_trunk(
     """Everything that is wrong with the subjects, tasks and muscles of a cohort."""
     further = cohort.further
     needed = (SUBJECTS, TRIALS) if study.motions.trials else (SUBJECTS, TASKS)
-    for form in needed:
-        if form.stem not in further:
-            found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
-            remedy = f"add {form.file}, or name another cohort"
-            yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
+    yield from lacking_tables(document, needed, cohort)
     if "subjects" in further:
         yield from subject_problems(cohort, further["subjects"])
     if "tasks" in further:
@@ -66,7 +62,7 @@ def check_trunk(
     if study.motions.trials and TRIALS.stem in further:
         known = list(dict.fromkeys(further[TRIALS.stem]["trial"].astype(str)))
         yield from unknown_names(document, "motions.trials", "trial", study.motions.trials, known)
-        yield from _without_stance(cohort)
+        yield from row_problems(cohort)
     if study.geometry == "cohort":
         yield from _without_geometry(document, cohort)
         yield from _several_trunks(cohort)
@@ -92,18 +88,9 @@ def check_source(
 def check_lifts(
     _document: YamlDocument, study: TrunkLoads, cohort: Cohort, _root: Path
 ) -> Iterator[InputProblem]:
-    """Refuse recordings that are not what their tables say; nothing where nobody is tracked."""
-    if study.motions.trials and TRIALS.stem in cohort.further and not [*_without_stance(cohort)]:
+    """Refuse recordings that are not what their tables say; nothing where no lift is asked for."""
+    if study.motions.trials and TRIALS.stem in cohort.further and not any(row_problems(cohort)):
         yield from recorded_problems(cohort, USUAL_CUTOFF_HZ)
-
-
-def _without_stance(cohort: Cohort) -> Iterator[InputProblem]:
-    """Persons of whom nobody knows how markers lie when they stand."""
-    for name in cohort.specimen_names:
-        if static_trial(cohort, name) is None:
-            found, allowed = f"no stance of '{name}'", f"a trial of kind {STANCE} for each person"
-            remedy = "add one in which the person stands upright, or mark one static"
-            yield InputProblem(f"{cohort.name}/{TRIALS.file}", None, "kind", found, allowed, remedy)
 
 
 def _without_geometry(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:

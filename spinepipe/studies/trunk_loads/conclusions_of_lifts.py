@@ -54,7 +54,8 @@ def of_lifts(
         rebuilt = "rebuilt" if cohort.rebuilt else "scaled"
         yield Conclusion("bodies_from", f"check_{rebuilt}")
         yield Conclusion("bodies", rebuilt)
-    values = numbers_from("lift_loads", lifts=len(lifts), frames=_frames(tables["lift_loads"]))
+    frames = int((tables["lift_loads"]["level"] == L4L5).sum())
+    values = numbers_from("lift_loads", lifts=len(lifts), frames=frames)
     values |= numbers_from("settings: motions", samples=study.motions.samples)
     drawn = "sampled" if study.motions.samples else "single"
     yield Conclusion("lift_methods", f"alone_{drawn}" if alone else drawn, values)
@@ -101,10 +102,6 @@ def _largest(found: list[LargestLoad], loads: pd.DataFrame, alone: bool) -> Iter
         yield Conclusion("lift_time", verdict, {"value": when}, names)
     told = {"value": values["apart"], "limit": values["limit"]}
     yield Conclusion("lift_limit", side, told, names)
-
-
-def _frames(loads: pd.DataFrame) -> int:
-    return int((loads["level"] == L4L5).sum())
 
 
 def _held(loads: pd.DataFrame, asked_mpa: float) -> Iterator[Conclusion]:

@@ -39,7 +39,7 @@ from spinepipe.studies.trunk_loads.postures import leaning_deg
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, level_rows, path_rows
 from spinepipe.studies.trunk_loads.sampling import censored_quantile, values_at
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.tables import LIFT_BANDS, LIFT_FRAMES, LIFT_LOADS, LIFT_PATHS
+from spinepipe.studies.trunk_loads.tables import PER_LIFT
 from spinepipe.tables import from_rows, write
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -48,8 +48,6 @@ LIFTED = "load"
 
 MOST_DRAWN = 25
 """Frames of the animation; more are thinned out evenly, but for the one with the largest load."""
-
-PER_LIFT = (LIFT_LOADS, LIFT_FRAMES, LIFT_BANDS, LIFT_PATHS)
 
 
 def run(root: str, study: str, specimen: str, trial: str, **paths: str) -> None:
@@ -123,7 +121,7 @@ def tasks_of(
     rows = [skeleton.BODIES.index(name) for name in BODIES]
     carriers = np.array([body_of(name) for name in motion.loads.carriers])
     pelvis, trunk = (known.get(f"{part}_extension_deg", 0.0) for part in ("pelvis", "trunk"))
-    turned = motion.rotations[:, rows] @ np.swapaxes(motion.standing[rows], -1, -2)
+    turned = motion.rotations[:, rows]
     bent = np.swapaxes(turned[:, -1], -1, -2) @ turned[:, 0]  # the trunk against the pelvis
     flexion_deg = DEG_PER_RAD * np.arctan2(bent[:, 1, 0], bent[:, 0, 0])
     leaning = {

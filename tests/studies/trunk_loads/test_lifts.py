@@ -202,8 +202,17 @@ def test_a_cohort_of_lifts_needs_no_tasks_and_what_it_lacks_is_named() -> None:
     trials = cohort().further["trials"]
     moving = trials[trials["kind"] != "stance"]
     (without,) = problems({"trials": moving})
-    assert "no stance of 's01'" in without
+    assert "no static trial of 's01'" in without
     assert "mark one static" in without
+    others = trials.iloc[1:]
+    for column, text, told in (
+        ("axes", "x y", "name each axis once"),
+        ("file", "../other.c3d", "leads out of the folder"),
+    ):
+        (wrong,) = problems(
+            {"trials": pd.concat([trials.iloc[:1].assign(**{column: text}), others])}
+        )
+        assert told in wrong
     (unknown,) = problems({}, ("lift9",))
     assert "lift9" in unknown
     (none,) = problems({"trials": None})
