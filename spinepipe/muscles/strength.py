@@ -78,6 +78,7 @@ def hold_task(
     options: SolverOptions,
     least: Least = "of_posture",
     nearby: SolvedTask | None = None,
+    highest_pa: float = HIGHEST_PA,
 ) -> HeldTask:
     """A task with the forces that hold it, at the stress asked for or the least above that does.
 
@@ -86,6 +87,7 @@ def hold_task(
     least : whether the least stress is sought where less than what was asked for does, or told of
         the posture that was found, or not told there.
     nearby : a task much like it, such as the frame before, whose forces shorten the way.
+    highest_pa : stress up to which it is tried.
 
     Raises
     ------
@@ -112,9 +114,9 @@ def hold_task(
         else:
             unsettled = now if held else unsettled
             too_little = now.task.stress_pa
-            if stress > _FAR * HIGHEST_PA:
+            if stress > _FAR * highest_pa:
                 break
-        stress = min(max(stress, _STEP * too_little), max(HIGHEST_PA, task.stress_pa))
+        stress = min(max(stress, _STEP * too_little), max(highest_pa, task.stress_pa))
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
             break
         now, solves = _at(person, task, stress, options, now), solves + 1

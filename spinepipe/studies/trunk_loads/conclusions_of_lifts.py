@@ -8,6 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import plain
 from spinepipe.status import Balanced
+from spinepipe.studies.trunk_loads.conclusions_of_trust import people_mpa
 from spinepipe.studies.trunk_loads.lift_rows import (
     GUIDELINE_N,
     L4L5,
@@ -122,12 +123,14 @@ def _held(loads: pd.DataFrame, asked_mpa: float) -> Iterator[Conclusion]:
 
 
 def _bands(bands: pd.DataFrame) -> Iterator[Conclusion]:
-    """How many persons that were drawn do not hold a frame."""
+    """How many persons that were drawn do not hold a frame, or at more stress than people have."""
     rows = bands[bands["level"] == L4L5] if len(bands) else bands
     if rows.empty:
         return
     lost, n = int(rows["n_failed"].sum()), int((rows["n_failed"] + rows["n_samples"]).sum())
     values = numbers_from("lift_bands", lost=lost, samples=n)
     values |= numbers_from("lift_bands", frames=len(rows), without=int(rows["high"].isna().sum()))
-    verdict = "check_open" if rows["high"].isna().any() else "check" if lost else "ok"
+    values |= numbers_from("lift_bands", above=int(rows["n_above"].sum())) | people_mpa()
+    verdict = "check" if lost or values["above"].number else "ok"
+    verdict = "check_open" if rows["high"].isna().any() else verdict
     yield Conclusion("lift_bands", verdict, values)

@@ -21,7 +21,7 @@ from spinepipe.motion.recorded_motion import RecordedMotion
 from spinepipe.motion.standing_spine import standing_spine
 from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.strength import HeldTask, Least, hold_task
+from spinepipe.muscles.strength import HIGHEST_PA, HeldTask, Least, hold_task
 from spinepipe.muscles.task import Instant, Task
 from spinepipe.muscles.trunk import BODIES, LEVELS, body_of
 from spinepipe.progress import Progress
@@ -35,7 +35,7 @@ from spinepipe.studies.trunk_loads.persons import (
     extra_inputs,
     solver_options,
 )
-from spinepipe.studies.trunk_loads.postures import between
+from spinepipe.studies.trunk_loads.postures import leaning_deg
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, level_rows, path_rows
 from spinepipe.studies.trunk_loads.sampling import censored_quantile, values_at
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
@@ -120,11 +120,17 @@ def tasks_of(
     known = values or {}
     rows = [skeleton.BODIES.index(name) for name in BODIES]
     carriers = np.array([body_of(name) for name in motion.loads.carriers])
-    lean = between(
-        known.get("pelvis_extension_deg", 0.0), known.get("trunk_extension_deg", 0.0), "extension"
-    )
-    leaning = np.array([rotation_zxy(rad, 0.0, 0.0) for rad in (lean / DEG_PER_RAD).tolist()])
+    pelvis, trunk = (known.get(f"{part}_extension_deg", 0.0) for part in ("pelvis", "trunk"))
     turned = motion.rotations[:, rows]
+    bent = np.swapaxes(turned[:, -1], -1, -2) @ turned[:, 0]  # the trunk against the pelvis
+    flexion_deg = DEG_PER_RAD * np.arctan2(bent[:, 1, 0], bent[:, 0, 0])
+    leaning = {
+        f: [
+            rotation_zxy(rad, 0, 0)
+            for rad in leaning_deg(pelvis, trunk, flexion_deg[f]) / DEG_PER_RAD
+        ]
+        for f in frames.tolist()
+    }
     at = motion.loads.at - motion.l5s1[:, None]
     return [
         Task(
@@ -135,7 +141,7 @@ def tasks_of(
             pressure_pa=1e3 * known.get("pressure_kpa", 0.0),
             stress_pa=stress_pa + 1e6 * known.get("largest_stress_mpa", 0.0),
             instant=Instant(
-                leaning @ turned[f],
+                np.array(leaning[f]) @ turned[f],
                 carriers,
                 at[f],
                 motion.loads.forces[f],
@@ -147,12 +153,16 @@ def tasks_of(
 
 
 def held_in_turn(
-    person: Person, tasks: Sequence[Task], options: SolverOptions, least: Least = "of_posture"
+    person: Person,
+    tasks: Sequence[Task],
+    options: SolverOptions,
+    least: Least = "of_posture",
+    highest_pa: float = HIGHEST_PA,
 ) -> Iterator[HeldTask]:
     """Tasks that follow each other closely, each begun where the one before ended."""
     before = None
     for task in tasks:
-        held = hold_task(person, task, options, least, before)
+        held = hold_task(person, task, options, least, before, highest_pa)
         before = held.solved
         yield held
 
@@ -197,23 +207,28 @@ def _samples(
     frames: NDArray[np.int64],
     progress: Progress,
 ) -> tuple[Array, Array]:
-    """(S, N, 7) N compression of persons drawn by the uncertain inputs, and (S, N) whether held."""
+    """(S, N, 7) N compression of persons drawn by the uncertain inputs, and (S, N) Pa, largest
+    stress that muscles were allowed; infinite where the frame is not held.
+
+    The person did lift: who is drawn too weak for it has the loads at the stress that it takes.
+    """
     asked, options = settings.motions, solver_options(settings)
-    found, held = list[list[Array]](), list[list[bool]]()
     drawn = list[Values]()
     if asked.samples:
         factors = list(settings.uncertain.factors)
         design = draw("latin_hypercube", factors, asked.samples, settings.uncertain.seed)
         drawn = [dict(zip(factors, row, strict=True)) for row in values_at(settings, design)]
-    for values in progress.through(drawn, f"{motion.name}: persons drawn"):
+    compression = np.zeros((len(drawn), len(frames), len(LEVELS)))
+    stress = np.full(compression.shape[:2], np.inf)
+    numbered = progress.through(list(enumerate(drawn)), f"{motion.name}: persons drawn")
+    for s, values in numbered:
         person = stands.varied(values)
         sized = of_mass(motion, person.subject.mass_kg / stands.subject.mass_kg)
         tasks = tasks_of(sized, frames, 1e6 * asked.largest_stress_mpa, values)
-        solved = [one.solved for one in held_in_turn(person, tasks, options, "untold")]
-        found.append([one.compression for one in solved])
-        held.append([one.status in HELD for one in solved])
-    shape = (len(found), len(frames))
-    return np.reshape(found, (*shape, len(LEVELS))), np.reshape(held, shape).astype(bool)
+        for f, one in enumerate(held_in_turn(person, tasks, options, "untold", np.inf)):
+            if one.solved.status in HELD:
+                compression[s, f], stress[s, f] = one.solved.compression, one.task.stress_pa
+    return compression, stress
 
 
 def of_mass(motion: RecordedMotion, times: float) -> RecordedMotion:
@@ -226,18 +241,20 @@ def of_mass(motion: RecordedMotion, times: float) -> RecordedMotion:
     )
 
 
-def band_rows(times: Array, compression: Array, held: Array) -> Iterator[Row]:
-    if not len(held):
+def band_rows(times: Array, compression: Array, stress: Array) -> Iterator[Row]:
+    if not len(stress):
         return
     for k, time in enumerate(times.tolist()):
-        good = compression[held[:, k], k]
-        lost = len(held) - len(good)
+        held = np.isfinite(stress[:, k])
+        lost = int((~held).sum())
         for level, name in enumerate(LEVELS):
-            ends = [censored_quantile(good[:, level], lost, p) for p in (0.025, 0.5, 0.975)]
+            known = compression[held, k, level]
+            ends = [censored_quantile(known, lost, p) for p in (0.025, 0.5, 0.975)]
             yield {
                 "time_s": time,
                 "level": name,
                 **dict(zip(("low", "median", "high"), ends, strict=True)),
-                "n_samples": len(good),
+                "n_samples": len(known),
                 "n_failed": lost,
+                "n_above": int((stress[held, k] > HIGHEST_PA).sum()),
             }

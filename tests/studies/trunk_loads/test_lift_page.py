@@ -66,7 +66,9 @@ def tables(
                 told_of = {"low": 0.9 * newtons, "median": newtons, "high": 1.1 * newtons}
                 if failed > 20:
                     told_of["high"] = None
-                sampled.append(own | told_of | {"n_samples": 100 - failed, "n_failed": failed})
+                sampled.append(
+                    own | told_of | {"n_samples": 100 - failed, "n_failed": failed, "n_above": 0}
+                )
     made = {"lift_loads": loads, "lift_frames": frames, "lift_bands": sampled if bands else []}
     return {name: pd.DataFrame(of, columns=NAMED[name].names) for name, of in made.items()}
 

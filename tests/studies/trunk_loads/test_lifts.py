@@ -163,13 +163,14 @@ def test_uncertain_lean_turns_bodies_and_no_load() -> None:
 def test_persons_that_do_not_hold_a_frame_count_beyond_its_upper_end() -> None:
     compression = np.zeros((100, 2, len(LEVELS)))
     compression[:, :, 1] = np.arange(100.0)[:, None]
-    held = np.ones((100, 2), dtype=bool)
-    held[98:, 0] = False
-    held[5:, 1] = False  # too few to tell
-    found = pd.DataFrame(band_rows(np.array([0.0, 0.1]), compression, held))
+    stress = np.full((100, 2), 0.6e6)
+    stress[90:98, 0] = 1.4e6  # more than trunks have
+    stress[98:, 0] = np.inf
+    stress[5:, 1] = np.inf  # too few to tell
+    found = pd.DataFrame(band_rows(np.array([0.0, 0.1]), compression, stress))
     own = found[found["level"] == "L4L5"].set_index("time_s")
     first, second = own.loc[0.0], own.loc[0.1]
-    assert (first["n_samples"], first["n_failed"]) == (98, 2)
+    assert (first["n_samples"], first["n_failed"], first["n_above"]) == (98, 2, 8)
     assert first["low"] == np.quantile(np.arange(100.0), 0.025)
     assert first["high"] == pytest.approx(np.quantile(np.arange(100.0), 0.975))
     assert second[["low", "median", "high"]].isna().all()
