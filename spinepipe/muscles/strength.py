@@ -114,7 +114,7 @@ def hold_task(
         else:
             unsettled = now if held else unsettled
             too_little = now.task.stress_pa
-            if stress > _FAR * highest_pa:
+            if now.least_pa is None or stress > _FAR * highest_pa:
                 break
         stress = min(max(stress, _STEP * too_little), max(highest_pa, task.stress_pa))
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
