@@ -26,3 +26,8 @@ HEIGHT_M: Mapping[str, float] = numbers(__name__, "segment_people_height")
 def length_m(segment: str, sex: Sex, height_m: float) -> float:
     """Of a person of this height: it grows with height."""
     return LENGTH_M[f"{segment} {sex}"] * height_m / HEIGHT_M[sex]
+
+
+def mass_kg(segment: str, sex: Sex, body_kg: float) -> float:
+    """Of a person of this body mass; of arms one side."""
+    return MASS_PERCENT[f"{segment} {sex}"] / 100.0 * body_kg

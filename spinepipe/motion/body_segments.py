@@ -22,7 +22,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from spinepipe.anatomy.segments import CENTRE, GYRATION, HEIGHT_M, LENGTH_M, MASS_PERCENT, length_m
+from spinepipe.anatomy.segments import CENTRE, GYRATION, HEIGHT_M, LENGTH_M, Sex, length_m, mass_kg
 from spinepipe.effects.contract import Array
 from spinepipe.facts import number, several
 from spinepipe.frames import Pose
@@ -179,11 +179,6 @@ def head_and_arm_parts(arms: Arms, subject: Subject, t1: Array) -> tuple[RigidPa
     tall = subject.height_m / REFERENCE.height_m
     head = t1 + tall * HEAD_M
     shoulder = t1 + tall * SHOULDER_M
-    named = f"head {subject.sex}"
-    kg = MASS_PERCENT[named] / 100.0 * subject.mass_kg
-    length = length_m("head", subject.sex, subject.height_m)
-    forwards, sideways, along = length * np.array(GYRATION[named])
-    own = RigidPart("head", kg, head, kg * np.diag([forwards**2, along**2, sideways**2]))
     right = tuple(_arm(arms, subject, shoulder, head, t1))
     # the left arm lies across the plane of symmetry at T1
     flip = np.diag([1.0, 1.0, -1.0])
@@ -196,7 +191,15 @@ def head_and_arm_parts(arms: Arms, subject: Subject, t1: Array) -> tuple[RigidPa
         )
         for part in right
     )
-    return (own, *right, *left)
+    return (upright_head(subject, head), *right, *left)
+
+
+def upright_head(subject: Subject, at: Array) -> RigidPart:
+    """Head and neck, their centre of mass at (3,) m, ground axes."""
+    kg = mass_kg("head", subject.sex, subject.mass_kg)
+    length = length_m("head", subject.sex, subject.height_m)
+    forwards, sideways, along = length * np.array(GYRATION[f"head {subject.sex}"])
+    return RigidPart("head", kg, at, kg * np.diag([forwards**2, along**2, sideways**2]))
 
 
 def _arm(
@@ -227,18 +230,23 @@ def _arm(
 def _segment(
     segment: str, subject: Subject, start: Array, along: Array, length: float
 ) -> RigidPart:
-    """A segment from its upper end along a direction (3,); round, as its axes are not known.
+    """A segment from its upper end along a direction (3,)."""
+    kg = mass_kg(segment, subject.sex, subject.mass_kg)
+    across, lengthwise = round_gyration(segment, subject.sex)
+    axis = np.outer(along, along)
+    about = kg * length**2 * (across**2 * (np.eye(3) - axis) + lengthwise**2 * axis)
+    at = start + CENTRE[f"{segment} {subject.sex}"] * length * along
+    return RigidPart(f"right_{segment}", kg, at, about)
+
+
+def round_gyration(segment: str, sex: Sex) -> tuple[float, float]:
+    """Radii across a segment of an arm and along it, shares of its length; round, as its axes are
+    not known.
 
     De Leva's two radii across the segment differ by 1 to 18 %; their mean square is taken.
     """
-    named = f"{segment} {subject.sex}"
-    kg = MASS_PERCENT[named] / 100.0 * subject.mass_kg
-    forwards, sideways, lengthwise = GYRATION[named]
-    across = 0.5 * (forwards**2 + sideways**2)
-    axis = np.outer(along, along)
-    about = kg * length**2 * (across * (np.eye(3) - axis) + lengthwise**2 * axis)
-    at = start + CENTRE[named] * length * along
-    return RigidPart(f"right_{segment}", kg, at, about)
+    forwards, sideways, lengthwise = GYRATION[f"{segment} {sex}"]
+    return float(np.sqrt(0.5 * (forwards**2 + sideways**2))), lengthwise
 
 
 def elbow_between(

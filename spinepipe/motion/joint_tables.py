@@ -17,6 +17,7 @@ right bending and left rotation. A joint that a set does not name is locked: `ch
 shares out L1-S1 and holds all from T12L1 upwards stiff. Wang 2021 also used shares of Bruno 2015
 and of Shojaei 2017, which are printed in no text at hand; a cohort that has them brings them.
 `white_panjabi_1990` is no set of the paper: it shares T1-S1 out as ranges of motion are.
+`ghezelbash_2016` is that of its section 2.6, T11-S1.
 """
 
 from collections.abc import Sequence
@@ -42,8 +43,8 @@ ENDS = ("low", "high")
 
 RATIOS_FILE = "ratios.csv"
 
-USUAL_SHARES = "christophy_2012"
-"""Set of ratios that is confirmed."""
+USUAL_SHARES = "ghezelbash_2016"
+"""Set of tasks and of recorded lifts; ligaments of a trunk (`muscles`) are made for it."""
 
 SUM_DIFFERS = 2e-3
 """By how much shares may miss 1: seventeen of them, rounded to four digits."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from spinepipe.effects.contract import Array
 from spinepipe.motion.smoothing import acceleration
-from spinepipe.units import STANDARD_GRAVITY
+from spinepipe.units import GRAVITY_M_S2, STANDARD_GRAVITY
 
 RISEN_M = 0.005
 """Ten times the noise of a marker: a choice."""
@@ -66,11 +66,10 @@ def borne_by_plates(kg: float, plates: Mapping[str, Array]) -> tuple[float, Arra
     -------
     None where no plate bears less by its weight at the end than at the beginning.
     """
-    gravity = float(np.linalg.norm(STANDARD_GRAVITY))
     for upwards in plates.values():
         part = max(1, len(upwards) // TENTH)
         before, after = float(np.median(upwards[:part])), float(np.median(upwards[-part:]))
-        weighed = (before - after) / gravity
+        weighed = (before - after) / GRAVITY_M_S2
         if abs(weighed - kg) <= SAME_WEIGHT * kg:
             return weighed, np.clip((before - upwards) / (before - after), 0.0, 1.0)
     return None

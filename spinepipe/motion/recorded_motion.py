@@ -14,10 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spinepipe.anatomy.segments import CENTRE, GYRATION, MASS_PERCENT, length_m
+from spinepipe.anatomy.segments import CENTRE, length_m, mass_kg
 from spinepipe.effects.contract import Array
 from spinepipe.frames import zxy_angles
-from spinepipe.motion.body_segments import RigidPart
+from spinepipe.motion.body_segments import RigidPart, round_gyration, upright_head
 from spinepipe.motion.lifted_load import LiftedLoad
 from spinepipe.motion.marker_groups import rigid_rotations
 from spinepipe.motion.plug_in_gait import (
@@ -73,7 +73,6 @@ class RecordedMotion:
     name : of the trial. time_s : (F,).
     l5s1 : (F, 3) m, centre of the disc. joints : (F, 17, 3) m, as `JOINTS`; all in ground.
     rotations : (F, 18, 3, 3) of `BODIES` in ground: how far each is turned from standing upright.
-    standing : (18, 3, 3) the same in the stance trial, where it is none.
     loads : with inertia. still : at the same places as if nothing were accelerated.
     lift_off_s : when hands bear half of what they lift; None where they do so all the time.
     """
@@ -83,7 +82,6 @@ class RecordedMotion:
     l5s1: Array
     joints: Array
     rotations: Array
-    standing: Array
     loads: CarriedLoads
     still: CarriedLoads
     lift_off_s: float | None = None
@@ -136,13 +134,12 @@ def move(
     head = _carried(stance, places, HEAD, turned["head"], centre)
     parts = [
         *_slices(spine, joints, bodies, step_s),
-        _head(spine.subject, head, turned["head"], step_s),
+        _rigid("head", T1, upright_head(spine.subject, centre), head, turned["head"], step_s),
         *_arms(spine.subject, places, step_s),
     ]
     loads, still = carried_loads(parts, load, step_s)
-    standing = np.broadcast_to(np.eye(3), (len(BODIES), 3, 3))
     lift_off = None if load is None or load.lift_off is None else float(time_s[load.lift_off])
-    return RecordedMotion(name, time_s, l5s1, joints, bodies, standing, loads, still, lift_off)
+    return RecordedMotion(name, time_s, l5s1, joints, bodies, loads, still, lift_off)
 
 
 def shared_rotations(pelvis: Array, thorax: Array, shares: Array) -> Array:
@@ -248,15 +245,6 @@ def _rigid(
     return MovingPart(name, carrier, part.kg, at, momentum)
 
 
-def _head(subject: Subject, at: Array, turn: Array, step_s: float) -> MovingPart:
-    named = f"head {subject.sex}"
-    kg = MASS_PERCENT[named] / 100.0 * subject.mass_kg
-    length = length_m("head", subject.sex, subject.height_m)
-    forwards, sideways, along = (length * np.array(GYRATION[named])) ** 2
-    own = RigidPart("head", kg, np.zeros(3), kg * np.diag([forwards, along, sideways]))
-    return _rigid("head", T1, own, at, turn, step_s)
-
-
 def _arms(subject: Subject, places: Places, step_s: float) -> Iterator[MovingPart]:
     """Upper arm, forearm and hand of both sides, each a straight piece."""
     shoulders = shoulder_centres(places)
@@ -265,15 +253,13 @@ def _arms(subject: Subject, places: Places, step_s: float) -> Iterator[MovingPar
         wrist = 0.5 * (places[f"{letter}WRA"] + places[f"{letter}WRB"])
         ends = ((shoulders[letter], elbow), (elbow, wrist), (wrist, knuckle))
         for segment, (start, end) in zip(ARM, ends, strict=True):
-            named = f"{segment} {subject.sex}"
-            kg = MASS_PERCENT[named] / 100.0 * subject.mass_kg
+            kg = mass_kg(segment, subject.sex, subject.mass_kg)
             line = end - start
             size = np.linalg.norm(line, axis=1, keepdims=True)
             along, length = line / size, length_m(segment, subject.sex, subject.height_m)
             # markers tell both ends of a segment, but of the hand its direction alone
             reach = length if segment == "hand" else size
-            forwards, sideways, _ = GYRATION[named]
-            across = 0.5 * (forwards**2 + sideways**2) * length**2
-            momentum = kg * across * np.cross(along, velocity(along, step_s))
-            at = start + CENTRE[named] * reach * along
+            across, _ = round_gyration(segment, subject.sex)
+            momentum = kg * (across * length) ** 2 * np.cross(along, velocity(along, step_s))
+            at = start + CENTRE[f"{segment} {subject.sex}"] * reach * along
             yield MovingPart(f"{side}_{segment}", T1, kg, at, momentum)

@@ -24,7 +24,7 @@ from spinepipe.units import MM_PER_M
 
 UPRIGHT_DEG = several(__name__, "upright_extension")[""]
 """How S1 to T11 are turned in extension from the source's pose, in a man who stands: what the
-search of `spinepipe.muscles.upright` finds, which muscles and joints have a say in."""
+search of `spinepipe.muscles.upright` finds, in which stiffness of joints has a say."""
 
 
 @dataclass(frozen=True, eq=False)

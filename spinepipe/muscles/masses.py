@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from spinepipe.anatomy.segments import CENTRE, MASS_PERCENT, Sex
+from spinepipe.anatomy.segments import CENTRE, MASS_PERCENT, Sex, mass_kg
 from spinepipe.effects.contract import Array
 from spinepipe.facts import numbers
 from spinepipe.frames import rotation_zxy
@@ -76,7 +76,7 @@ def masses_of(trunk: Trunk, subject: Subject, ahead_times: float = 1.0) -> tuple
     """
     tall = subject.height_m / REFERENCE.height_m
     slices = zip(SLICES, slice_percents(), trunk.vertebrae, ahead_cm(), strict=True)
-    head_kg = MASS_PERCENT[f"head {subject.sex}"] / 100.0 * subject.mass_kg
+    head_kg = mass_kg("head", subject.sex, subject.mass_kg)
     return (
         *(
             Mass(
@@ -170,7 +170,7 @@ def arm_masses(side: str, shoulder: Array, hand: Array, subject: Subject) -> tup
         Mass(
             f"{side}_{segment}",
             THORAX,
-            MASS_PERCENT[f"{segment} {subject.sex}"] / 100.0 * subject.mass_kg,
+            mass_kg(segment, subject.sex, subject.mass_kg),
             shoulder + share * (hand - shoulder),
         )
         for segment, share in zip(ARM, centre_shares(subject.sex), strict=True)

@@ -85,8 +85,12 @@ class MomentCurve:
         return np.clip(rad, points[0], points[-1]), np.where(rad < points[0], chords[0], chords[-1])
 
 
-def _measured(source: str, back: str = "flexion") -> "Curves":
-    """About x, y and z, through the points of two sides, as `heuer flexion` names them in
+Curves = tuple[MomentCurve, MomentCurve, MomentCurve]
+"""About x, y and z."""
+
+
+def _measured(source: str, back: str = "flexion") -> Curves:
+    """Through the points of two sides, as `heuer flexion` names them in
     `facts.csv`; `back` is extension where a source has one curve for both of its sides."""
     known = several(__name__, "moment_curve")
     sides = (("right_bending",) * 2, ("left_rotation",) * 2, (back, "extension"))
@@ -113,7 +117,7 @@ def _linear(nm_per_rad: float) -> MomentCurve:
 _GOULD = published("gould_2024b")["uniform_stiffness"]
 _SCHMIDT, _HEUER = _measured("schmidt"), _measured("heuer")
 
-CURVES: Mapping[str, "Curves"] = {
+CURVES: Mapping[str, Curves] = {
     "segment_gould": (  # linear, whole segments
         _linear(_GOULD["right_bending_nm_per_rad"]),
         _linear(_GOULD["left_rotation_nm_per_rad"]),
@@ -131,10 +135,8 @@ mixed: sideways the disc alone, else whole segments. Ligaments and facets hardly
 sideways; a segment as stiff sideways as Schmidt's needs muscles to bend it where people lean.
 """
 
-Curves = tuple[MomentCurve, MomentCurve, MomentCurve]
-
 T11T12_WITH_RIBS: Curves = _measured("wilke", back="extension")
-"""About x, y and z: the segment with its rib joints."""
+"""The segment with its rib joints."""
 
 
 @dataclass(frozen=True, eq=False)

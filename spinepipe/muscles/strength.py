@@ -78,6 +78,7 @@ def hold_task(
     options: SolverOptions,
     least: Least = "of_posture",
     nearby: SolvedTask | None = None,
+    highest_pa: float = HIGHEST_PA,
 ) -> HeldTask:
     """A task with the forces that hold it, at the stress asked for or the least above that does.
 
@@ -86,6 +87,7 @@ def hold_task(
     least : whether the least stress is sought where less than what was asked for does, or told of
         the posture that was found, or not told there.
     nearby : a task much like it, such as the frame before, whose forces shorten the way.
+    highest_pa : stress up to which it is tried.
 
     Raises
     ------
@@ -101,19 +103,24 @@ def hold_task(
     now = replace(now, least_pa=_least_pa(asked, options))
     if done:
         return now
-    best, too_little, solves = None, 0.0, 1
+    best, unsettled, too_little, solves = None, None, 0.0, 1
     while solves < _MOST_SOLVES:
         stress = np.inf if now.least_pa is None else _ABOVE_LEAST * now.least_pa
-        if _is_held(now, options):
+        # so near the least stress hardly any forces will do, and rounds may swing: a little more is
+        # tried then
+        held = _is_held(now, options)
+        if held and (now.solved is asked or now.solved.status is Balanced.CONVERGED):
             best = now
         else:
+            unsettled = now if held else unsettled
             too_little = now.task.stress_pa
-            if stress > _FAR * HIGHEST_PA:
+            if now.least_pa is None or stress > _FAR * highest_pa:
                 break
-        stress = min(max(stress, _STEP * too_little), max(HIGHEST_PA, task.stress_pa))
+        stress = min(max(stress, _STEP * too_little), max(highest_pa, task.stress_pa))
         if stress <= too_little or (best is not None and stress * _NEAR >= best.task.stress_pa):
             break
         now, solves = _at(person, task, stress, options, now), solves + 1
+    best = best or unsettled
     if best is None:
         return replace(_not_held(now, person, task), solves=solves)
     takes = min(best.task.stress_pa, best.least_pa or np.inf)

@@ -11,11 +11,14 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.motion.marker_groups import rigid_rotations, runs
+from spinepipe.motion.reading import DEFAULT_AXES
+from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.skeleton import PELVIS, MarkerSet, MarkerTrial
 from spinepipe.problems import InputProblem
-from spinepipe.studies.recordings import STANCE
+from spinepipe.studies.recordings import STANCE, TRIALS, Row, trial_of
 from spinepipe.units import MM_PER_M
 
 LONGEST_GAP_S = 0.5
@@ -77,6 +80,22 @@ class LoadedTrial:
     line: int
     first: int
     set: str = "marker_set.csv"
+
+    @classmethod
+    def of(
+        cls,
+        cohort: Cohort,
+        row: Row,
+        read: MarkerRecording,
+        markers: MarkerSet,
+        neutral: Array,
+        set: str = "marker_set.csv",
+    ) -> "LoadedTrial":
+        """A row of `trials.csv` and its recording, in which markers have the names of the set."""
+        axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
+        files = f"{cohort.name}/{row['file']}", f"{cohort.name}/{TRIALS.file}"
+        trial = trial_of(row, markers, read)
+        return cls(trial, markers, neutral, axes, *files, row["line"], read.first, set)
 
     @cached_property
     def turned(self) -> tuple[Array, NDArray[np.bool_]]:

@@ -1,6 +1,7 @@
 """Is a recorded lift what its tables say: markers of Plug-in-Gait, what is lifted, its clock?"""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -8,16 +9,15 @@ from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.motion.lifted_load import LiftedLoad
 from spinepipe.motion.plug_in_gait import PLACES, marker_places
-from spinepipe.motion.reading import DEFAULT_AXES
-from spinepipe.motion.skeleton import BODIES, PELVIS, MarkerSet, MarkerTrial
+from spinepipe.motion.recording import MarkerRecording
+from spinepipe.motion.skeleton import BODIES, PELVIS, MarkerSet
 from spinepipe.problems import InputError, InputProblem
 from spinepipe.studies.checks_of_markers import LoadedTrial
 from spinepipe.studies.checks_of_motion import better_axes, motion_problems
-from spinepipe.studies.recorded_motion import HANDS, lifted_load, places_of, smooth_places
+from spinepipe.studies.recorded_motion import HANDS, lifted_load, places_in, smoothed
 from spinepipe.studies.recordings import (
     BOX,
     STANCE,
-    TRIALS,
     Row,
     read_recording,
     static_trial,
@@ -51,26 +51,26 @@ def recorded_problems(cohort: Cohort, cutoff_hz: float) -> Iterator[InputProblem
         stance: dict[str, Array] = {}
         for row in sorted(rows, key=lambda row: row["trial"] != still):
             try:
-                _, places = places_of(row, cohort)
-                look = _loaded(row, cohort, specimen)
+                read = read_recording(row, cohort.name, cohort.folder)
+                places = places_in(read, f"{cohort.name}/{row['file']}")
+                look = _loaded(row, cohort, specimen, read)
                 found = [*motion_problems(look)] or [*_facing(look)]
                 stance = stance or {name: at.mean(axis=0) for name, at in places.items()}
                 found = found or list(_arms(f"{cohort.name}/{row['file']}", stance, places))
                 if not found and row["kind"] != STANCE:
-                    time_s, places = smooth_places(row, cohort, cutoff_hz)
-                    load = lifted_load(cohort, specimen, row, time_s, places, cutoff_hz)
-                    found = list(_load(cohort, row, time_s, places, load))
+                    places = smoothed(row, cohort, read.time_s, places, cutoff_hz)
+                    load = lifted_load(cohort, specimen, row, read.time_s, places, cutoff_hz)
+                    found = list(_load(cohort, row, read.time_s, places, load))
                 yield from found
             except InputError as error:
                 yield from error.problems
 
 
-def _loaded(row: Row, cohort: Cohort, specimen: str) -> LoadedTrial:
+def _loaded(row: Row, cohort: Cohort, specimen: str, read: MarkerRecording) -> LoadedTrial:
     """A trial with the markers of the trunk, as checks of markers look at it."""
-    read = read_recording(row, cohort.name, cohort.folder)
-    there = marker_places(read.names)
-    names = tuple(name for name in PLACES if name in there)
-    columns = [there[name] for name in names]
+    known = {k: name for name, k in marker_places(read.names).items()}
+    read = replace(read, names=tuple(known.get(k, text) for k, text in enumerate(read.names)))
+    names = tuple(name for name in PLACES if name in read.names)
     at = subject_of(cohort, specimen).height_m * np.array([PLACES[name] for name in names])
     pelvis = [name.endswith(("ASI", "PSI")) for name in names]
     markers = MarkerSet(
@@ -80,13 +80,7 @@ def _loaded(row: Row, cohort: Cohort, specimen: str) -> LoadedTrial:
         np.ones(len(names)),
         ("",) * len(names),
     )
-    name, kind, arms = (str(row[key]) for key in ("trial", "kind", "arms"))
-    trial = MarkerTrial(
-        name, kind, read.time_s, read.places[:, columns], read.seen[:, columns], arms
-    )
-    axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
-    files = f"{cohort.name}/{row['file']}", f"{cohort.name}/{TRIALS.file}"
-    return LoadedTrial(trial, markers, at, axes, *files, row["line"], read.first, "Plug-in-Gait")
+    return LoadedTrial.of(cohort, row, read, markers, at, "Plug-in-Gait")
 
 
 def _facing(look: LoadedTrial) -> Iterator[InputProblem]:

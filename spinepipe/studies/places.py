@@ -6,9 +6,21 @@ import pandas as pd
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.supports import motion_read
+from spinepipe.documents.form import TableForm
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.problems import InputProblem, Spelling
 from spinepipe.units import COORDINATE_COLUMNS, COORDINATES, has_reading
+
+
+def lacking_tables(
+    document: YamlDocument, forms: Iterable[TableForm], cohort: Cohort
+) -> Iterator[InputProblem]:
+    """Tables that a study needs and its cohort does not have."""
+    for form in forms:
+        if form.stem not in cohort.further:
+            found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
+            remedy = f"add {form.file}, or name another cohort"
+            yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
 
 
 def unknown_tests(

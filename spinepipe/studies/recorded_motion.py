@@ -21,7 +21,7 @@ from spinepipe.studies.recordings import (
     STANCE,
     TRIALS,
     Row,
-    of_specimen,
+    of_trial,
     read_recording,
     static_trial,
     trial_rows,
@@ -84,6 +84,19 @@ def smooth_places(row: Row, cohort: Cohort, cutoff_hz: float) -> tuple[Array, di
         Of frames that cannot be filtered, besides what `places_of` raises.
     """
     time_s, raw = places_of(row, cohort)
+    return time_s, smoothed(row, cohort, time_s, raw, cutoff_hz)
+
+
+def smoothed(
+    row: Row, cohort: Cohort, time_s: Array, raw: Mapping[str, Array], cutoff_hz: float
+) -> dict[str, Array]:
+    """Places (F, 3) m of the markers of a trial, filtered.
+
+    Raises
+    ------
+    InputError
+        Of frames that cannot be filtered.
+    """
     table = f"{cohort.name}/{TRIALS.file}"
     steps = np.diff(time_s)
     if len(steps) == 0 or np.ptp(steps) > EVEN * steps.mean():
@@ -92,12 +105,11 @@ def smooth_places(row: Row, cohort: Cohort, cutoff_hz: float) -> tuple[Array, di
         raise InputError([InputProblem(table, row["line"], "file", found, allowed, remedy)])
     rate = 1.0 / float(steps.mean())
     try:
-        places = {name: low_pass(at, rate, cutoff_hz) for name, at in raw.items()}
+        return {name: low_pass(at, rate, cutoff_hz) for name, at in raw.items()}
     except ValueError as why:
         allowed, remedy = "a trial that can be filtered", "record longer, or lower the cutoff"
         problem = InputProblem(table, row["line"], "file", str(why), allowed, remedy)
         raise InputError([problem]) from why
-    return time_s, places
 
 
 def lifted_load(
@@ -123,23 +135,21 @@ def lifted_load(
         return None
     rate = 1.0 / float(np.mean(np.diff(time_s)))
     at = np.mean([places[name] for name in HANDS], axis=0)
-    box = _of_trial(cohort, BOX.stem, specimen, str(row["trial"]))
+    box = of_trial(cohort, BOX, specimen, str(row["trial"]))
     borne = np.ones(len(time_s))
     for axis, column in enumerate(("x_mm", "y_mm", "z_mm")):
-        if box is None or box[column].isna().all():
+        if box[column].isna().all():
             continue
         measured = _on_clock(cohort, BOX.file, box, column, time_s) / MM_PER_M
         at[:, axis] = low_pass(measured, rate, cutoff_hz)
         if column == "y_mm":
             borne = borne_by_height(at[:, axis])
-    plates = _of_trial(cohort, FORCE_PLATES.stem, specimen, str(row["trial"]))
-    if plates is not None:
-        upwards = {
-            str(name): _on_clock(cohort, FORCE_PLATES.file, one, "fy_n", time_s)
-            for name, one in plates.groupby("plate", sort=False)
-        }
-        told = borne_by_plates(kg, upwards)
-        kg, borne = (kg, borne) if told is None else told
+    plates = of_trial(cohort, FORCE_PLATES, specimen, str(row["trial"]))
+    upwards = {
+        str(name): _on_clock(cohort, FORCE_PLATES.file, one, "fy_n", time_s)
+        for name, one in plates.dropna(subset="fy_n").groupby("plate", sort=False)
+    }
+    kg, borne = borne_by_plates(kg, upwards) or (kg, borne)
     return LiftedLoad(kg, at, borne)
 
 
@@ -152,8 +162,13 @@ def places_of(row: Row, cohort: Cohort) -> tuple[Array, dict[str, Array]]:
         Of a file that cannot be read, or that lacks markers.
     """
     read = read_recording(row, cohort.name, cohort.folder)
+    return read.time_s, places_in(read, f"{cohort.name}/{row['file']}")
+
+
+def places_in(read: MarkerRecording, file: str) -> dict[str, Array]:
+    """The same places of a recording; `file`: its name in messages."""
     at = marker_places(read.names)
-    lacking = list(_lacking(f"{cohort.name}/{row['file']}", read, at))
+    lacking = list(_lacking(file, read, at))
     if lacking:
         raise InputError(lacking)
     found = {}
@@ -167,7 +182,7 @@ def places_of(row: Row, cohort: Cohort) -> tuple[Array, dict[str, Array]]:
                 ],
                 axis=1,
             )
-    return read.time_s, found
+    return found
 
 
 def _lacking(file: str, read: MarkerRecording, at: Mapping[str, int]) -> Iterator[InputProblem]:
@@ -177,15 +192,6 @@ def _lacking(file: str, read: MarkerRecording, at: Mapping[str, int]) -> Iterato
             found = "never in sight" if name in at else "no such marker"
             allowed = f"all markers of Plug-in-Gait above the legs: {', '.join(NEEDED)}"
             yield InputProblem(file, None, name, found, allowed, "correct its name in the file")
-
-
-def _of_trial(cohort: Cohort, table: str, specimen: str, trial: str) -> pd.DataFrame | None:
-    """Rows of a table of a trial; None where there are none."""
-    if table not in cohort.further:
-        return None
-    rows = of_specimen(cohort.further[table], specimen)
-    rows = rows[rows["trial"] == trial]
-    return rows if len(rows) else None
 
 
 def _on_clock(cohort: Cohort, file: str, rows: pd.DataFrame, column: str, time_s: Array) -> Array:

@@ -9,6 +9,7 @@ from trunk_person import CLOSELY, held_task, made_up, tasks, volunteer
 from spinepipe.frames import rotation_zxy
 from spinepipe.muscles.applied_loads import applied_loads
 from spinepipe.muscles.muscle_equilibrium import TurnedPose, solve_task
+from spinepipe.muscles.passive_tissue import LIGAMENT_ARM_M
 from spinepipe.muscles.person import Person
 from spinepipe.muscles.pose import rotations_of
 from spinepipe.muscles.task import Instant, Task
@@ -62,9 +63,12 @@ def test_muscles_and_joints_hold_exactly_what_the_inverse_dynamics_has() -> None
     joint = pose.discs[0] @ found.joint_moments[0]
     np.testing.assert_allclose(net + muscles + joint + found.found.slack[:3], 0.0, atol=1e-6)
     np.testing.assert_allclose(found.demand.required[:3] + joint, -net, atol=1e-9)
+    # ligaments behind the joints pull the vertebrae together
+    pressed = made_up().laws.ligament_moments(pose.turned) / LIGAMENT_ARM_M
     for level in range(len(LEVELS)):
         drawn = np.einsum("mbi,m->bi", found.pulls.forces, found.found.forces)[level + 1 :]
         on = told.forces[told.bodies > level].sum(axis=0) + drawn.sum(axis=0)
+        on = on - pressed[level] * pose.discs[level][:, 1]
         np.testing.assert_allclose(pose.discs[level] @ found.pushes[level], on, atol=1e-6)
 
 

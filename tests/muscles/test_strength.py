@@ -194,6 +194,8 @@ def test_what_is_not_held_says_why_and_where() -> None:
     assert (arms.solved.status, arms.short_of) == (Balanced.BEYOND_STRENGTH, "arms")
     assert arms.least_pa is None
     assert f"no muscle forces of any size make what {arms.short_at} asks for" in arms.solved.message
+    anything = hold_task(without_belly(), pushed, ASKED, highest_pa=np.inf)
+    assert (anything.solved.status, anything.short_of) == (Balanced.BEYOND_STRENGTH, "arms")
     weak = hold_task(volunteer(), tasks()["exertion_extension"], ASKED)
     assert (weak.solved.status, weak.short_of) == (Balanced.BEYOND_STRENGTH, "strength")
     assert weak.least_pa is not None

@@ -20,6 +20,7 @@ from scipy.interpolate import CubicSpline
 
 from spinepipe.cohort import Cohort
 from spinepipe.cohort.cohort import memoize_per_cohort
+from spinepipe.decomposition import lstsq
 from spinepipe.documents.form import read_forms
 from spinepipe.effects.contract import Array
 from spinepipe.studies.scoliosis.settings import Scoliosis
@@ -329,7 +330,7 @@ def _own_sd(films: Sequence[Array]) -> float:
         level = np.kron(np.eye(2), np.ones(len(right)))
         moves = np.vstack([level, turning]).T  # (2 V, 3) what a frame's error does to all places
         off = (each - each.mean(axis=0))[:, :2].reshape(len(each), -1).T
-        squares += float(((off - moves @ np.linalg.lstsq(moves, off)[0]) ** 2).sum())
+        squares += float(((off - moves @ lstsq(moves, off)[0]) ** 2).sum())
         count += (len(each) - 1) * (len(off) - 3)
     return float(np.sqrt(squares / count)) if count else np.nan
 

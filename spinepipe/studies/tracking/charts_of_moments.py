@@ -6,8 +6,8 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.forms.chart import Chart, Key, saying
 from spinepipe.report.forms.curves import Curves
 from spinepipe.report.forms.look import BASE, MEASURED, MODEL
-from spinepipe.report.words import case, level, short
-from spinepipe.studies.recordings import MEASURED_MOMENTS
+from spinepipe.report.words import case, level, plain, short
+from spinepipe.studies.recordings import MEASURED_MOMENTS, of_trial
 from spinepipe.studies.tracking.conclusions_of_errors import Tables
 from spinepipe.studies.tracking.conclusions_of_moments import told_method
 from spinepipe.studies.tracking.settings import Tracking
@@ -31,8 +31,7 @@ def moments(study: Tracking, cohort: Cohort, tables: Tables) -> Chart:
             for series, column in (("moving", "extension_nm"), ("still", "still_extension_nm"))
         ]
         if method:
-            known = cohort.further[MEASURED_MOMENTS.stem]
-            known = known[(known["specimen"] == specimen) & (known["trial"] == trial)]
+            known = of_trial(cohort, MEASURED_MOMENTS, str(specimen), str(trial))
             known = known[(known["joint"] == joint) & (known["method"] == method)]
             one = {"x": known["time_s"], "y": known["mz_nm"], "series": "measured"}
             parts.insert(0, pd.DataFrame(one))
@@ -46,7 +45,7 @@ def moments(study: Tracking, cohort: Cohort, tables: Tables) -> Chart:
             )
         )
     words = {"moving": "computed", "still": "computed without accelerations"}
-    keys = [Key(MEASURED, f"measured, {method}", as_line=True)] if method else []
+    keys = [Key(MEASURED, f"measured {plain(method)}", as_line=True)] if method else []
     keys += [Key(LOOKS[name], text, as_line=True) for name, text in words.items()]
     caption = "Net moment on all above the joint, + extension, which holds a trunk bent forwards."
     return Chart(title, panels[:MOST_PANELS], caption, keys)

@@ -11,12 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from spinepipe.cohort import Cohort
-from spinepipe.documents.form import TableForm
-from spinepipe.documents.inside import outside
 from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.motion.passive import passive_elements
 from spinepipe.motion.points import marker_places
-from spinepipe.motion.reading import DEFAULT_AXES, READERS, axes_of
 from spinepipe.motion.recorded_motion import RIGID_FROM
 from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.skeleton import BODIES, MarkerSet
@@ -25,10 +22,10 @@ from spinepipe.problems import InputError, InputProblem, Spelling, one_of
 from spinepipe.studies.checks_of_markers import LoadedTrial
 from spinepipe.studies.checks_of_motion import motion_problems
 from spinepipe.studies.checks_of_recorded import recorded_problems
-from spinepipe.studies.places import unknown_names
-from spinepipe.studies.recordings import STANCE, TRIALS, read_recording, static_trial, trial_rows
+from spinepipe.studies.places import lacking_tables, unknown_names
+from spinepipe.studies.recordings import TRIALS, read_recording, row_problems, trial_rows
 from spinepipe.studies.subjects import MASS_KG, SUBJECTS, subject_of, subject_problems
-from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in, trial_of
+from spinepipe.studies.tracking.persons import marker_set, ratios_of, skeleton_in
 from spinepipe.studies.tracking.settings import CONSTRAINED, LEARNT, Tracking
 from spinepipe.studies.tracking.trials import MARKER_SET, PASSIVE, RATIOS, source_kinds
 from spinepipe.units import COORDINATES, ROTATIONS
@@ -103,9 +100,7 @@ def check_recordings(
 def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
     """Tables that every study of tracked motions needs, and the chain of joints from S1 to T1."""
     place = document.place_of("cohort")
-    for form in NEEDED:
-        if form.stem not in cohort.further:
-            yield _without(document, form)
+    yield from lacking_tables(document, NEEDED, cohort)
     if not cohort.has_frames:
         found, allowed = "a cohort without joints", "a cohort with joints.csv or landmarks.csv"
         yield InputProblem(*place, found, allowed, "tell where the joints are")
@@ -120,9 +115,7 @@ def _tables(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:
 
 def _lifts(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:
     """What a study of markers of Plug-in-Gait needs: persons, trials, and ratios that there are."""
-    for form in (SUBJECTS, TRIALS):
-        if form.stem not in cohort.further:
-            yield _without(document, form)
+    yield from lacking_tables(document, (SUBJECTS, TRIALS), cohort)
     try:
         sets = ratios_of(cohort)
     except InputError as error:
@@ -144,12 +137,6 @@ def _source(document: YamlDocument) -> Iterator[InputProblem]:
     except NoSource as error:
         allowed = f"{PACKAGE} in version {VERSION}"
         yield InputProblem(*document.place_of("marker_set"), error.found, allowed, REMEDY)
-
-
-def _without(document: YamlDocument, form: TableForm) -> InputProblem:
-    found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
-    remedy = f"add {form.file}, or name another cohort"
-    return InputProblem(*document.place_of("cohort"), found, allowed, remedy)
 
 
 def _approaches(document: YamlDocument, study: Tracking, cohort: Cohort) -> Iterator[InputProblem]:
@@ -201,32 +188,6 @@ def _bodies(cohort: Cohort) -> Iterator[InputProblem]:
             yield InputProblem(file, None, "mass_kg", found, allowed, "correct the masses")
 
 
-def row_problems(cohort: Cohort) -> Iterator[InputProblem]:
-    """Faults of files and axes in `trials.csv`; persons without a trial that tells their size."""
-    file = f"{cohort.name}/{TRIALS.file}"
-    for specimen in cohort.specimen_names:
-        for row in trial_rows(cohort, specimen):
-            name, place = str(row["file"]), (file, row["line"], "file")
-            if Path(name).suffix.lower() not in READERS:
-                found, allowed = f"'{name}'", f"a file of motion: {', '.join(READERS)}"
-                yield InputProblem(*place, found, allowed, "export it as one of these")
-            if isinstance(row["axes"], str):
-                try:
-                    axes_of(row["axes"])
-                except ValueError as error:
-                    allowed = "forwards, up and right in the axes of the file, as in 'x z -y'"
-                    remedy = "name each axis once, a minus where it points the other way"
-                    yield InputProblem(file, row["line"], "axes", str(error), allowed, remedy)
-            # a file outside the cohort's folder, by .. or by a link
-            if (led_out := outside(cohort.folder / name, cohort.folder, place, name)) is not None:
-                yield led_out
-        if static_trial(cohort, specimen) is None:
-            found = f"no static trial of '{specimen}'"
-            allowed = f"a trial of kind {STANCE}, or one marked static"
-            remedy = "add it: without it nobody's size is known"
-            yield InputProblem(file, None, "kind", found, allowed, remedy)
-
-
 def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
     """Everything that is wrong with files of motion, of a cohort whose tables are sound."""
     for specimen in cohort.specimen_names:
@@ -241,8 +202,7 @@ def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
             except InputError as error:
                 yield from error.problems
                 continue
-            file = f"{cohort.name}/{row['file']}"
-            yield from _missing_markers(file, markers, read)
+            yield from _missing_markers(f"{cohort.name}/{row['file']}", markers, read)
             # the trial is looked at with the markers that its file has
             kept = np.flatnonzero([name in read.names for name in markers.names])
             if not len(kept):
@@ -254,10 +214,7 @@ def recording_problems(cohort: Cohort) -> Iterator[InputProblem]:
                 markers.weight[kept],
                 tuple(markers.cluster[k] for k in kept),
             )
-            axes = row["axes"] if isinstance(row["axes"], str) else DEFAULT_AXES
-            places = (file, f"{cohort.name}/{TRIALS.file}", row["line"], read.first)
-            trial = trial_of(row, part, read)
-            yield from motion_problems(LoadedTrial(trial, part, neutral[kept], axes, *places))
+            yield from motion_problems(LoadedTrial.of(cohort, row, read, part, neutral[kept]))
 
 
 def _missing_markers(

@@ -15,12 +15,7 @@ from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.standing_spine import usual_spine
 from spinepipe.muscles.myo_sim import source_of_myo_sim
 from spinepipe.studies.recorded_motion import recorded_motion
-from spinepipe.studies.recordings import (
-    MEASURED_MOMENTS,
-    STANCE,
-    of_specimen,
-    trial_rows,
-)
+from spinepipe.studies.recordings import MEASURED_MOMENTS, STANCE, of_trial, trial_rows
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.persons import ratios_of
 from spinepipe.studies.tracking.settings import Tracking
@@ -63,7 +58,7 @@ def table_rows(settings: Tracking, cohort: Cohort) -> tuple[Rows, Rows]:
             both = zip(WAYS, (motion.loads, motion.still), strict=True)
             found = {way: net_moments(motion.joints, loads) for way, loads in both}
             rows += [known | row for row in moment_rows(motion, found)]
-            beside = measured_of(cohort, specimen, motion.name)
+            beside = of_trial(cohort, MEASURED_MOMENTS, specimen, motion.name)
             agreement += [known | row for row in agreement_rows(motion, found, beside)]
     return rows, agreement
 
@@ -80,14 +75,6 @@ def motions_of(settings: Tracking, cohort: Cohort, specimen: str) -> Iterator[Re
         if row["kind"] != STANCE:
             trial = str(row["trial"])
             yield recorded_motion(cohort, specimen, trial, spine, settings.cutoff_hz, shares)
-
-
-def measured_of(cohort: Cohort, specimen: str, trial: str) -> pd.DataFrame:
-    """Rows of `measured_moments.csv` of a trial."""
-    if MEASURED_MOMENTS.stem not in cohort.further:
-        return pd.DataFrame(columns=["joint", "method", "time_s", *MEASURED])
-    rows = of_specimen(cohort.further[MEASURED_MOMENTS.stem], specimen)
-    return rows[rows["trial"] == trial]
 
 
 def moment_rows(motion: RecordedMotion, found: Found) -> Iterator[dict[str, Any]]:
@@ -116,8 +103,9 @@ def agreement_rows(
     measured : rows of the trial.
     """
     time_s, off = motion.time_s, motion.lift_off_s
-    for (joint, method), rows in measured.groupby(["joint", "method"], sort=False):
-        rows = rows.sort_values("time_s").dropna(subset=list(MEASURED))
+    told = measured.dropna(subset=list(MEASURED))
+    for (joint, method), rows in told.groupby(["joint", "method"], sort=False):
+        rows = rows.sort_values("time_s")
         times = rows["time_s"].to_numpy(float)
         there = (time_s >= times[0]) & (time_s <= times[-1])
         truth = np.stack([np.interp(time_s, times, rows[name]) for name in MEASURED], axis=1)

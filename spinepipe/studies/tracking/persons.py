@@ -20,7 +20,6 @@ from spinepipe.frames import Pose
 from spinepipe.motion.body_segments import ARMS, slice_inertias, with_head_and_arms
 from spinepipe.motion.joint_tables import bounds, ratio_sets
 from spinepipe.motion.passive import PassiveElements, passive_elements
-from spinepipe.motion.recording import MarkerRecording
 from spinepipe.motion.scaling import ScalingFit, body_factors, fit_scaling, scale_skeleton
 from spinepipe.motion.skeleton import (
     BODIES,
@@ -33,7 +32,13 @@ from spinepipe.motion.skeleton import (
 )
 from spinepipe.muscles.masses import ahead_cm, slice_percents
 from spinepipe.muscles.subject import REFERENCE, Subject
-from spinepipe.studies.recordings import Row, of_specimen, read_recording, static_trial, trial_rows
+from spinepipe.studies.recordings import (
+    of_specimen,
+    read_recording,
+    static_trial,
+    trial_of,
+    trial_rows,
+)
 from spinepipe.studies.subjects import subject_of
 from spinepipe.studies.tracking.settings import Scaling
 from spinepipe.studies.tracking.tables import NO_STATIC, NOT_TOLD, TOLD
@@ -155,19 +160,6 @@ def skeleton_in_trial(person: TrackedPerson, trial: MarkerTrial) -> Skeleton:
 def ratios_of(cohort: Cohort) -> Mapping[str, Array]:
     """Sets of ratios that come along, and the cohort's own."""
     return ratio_sets(cohort.further.get(RATIOS.stem), f"{cohort.name}/{RATIOS.file}")
-
-
-def trial_of(row: Row, markers: MarkerSet, recorded: MarkerRecording) -> MarkerTrial:
-    """The trial of a row; markers of the set that the file lacks are never seen."""
-    # markers in the order of the set
-    n = len(recorded.time_s)
-    places, seen = np.zeros((n, len(markers), 3)), np.zeros((n, len(markers)), dtype=bool)
-    for k, name in enumerate(markers.names):
-        if name in recorded.names:
-            there = recorded.names.index(name)
-            places[:, k], seen[:, k] = recorded.places[:, there], recorded.seen[:, there]
-    name, kind, arms = (str(row[key]) for key in ("trial", "kind", "arms"))
-    return MarkerTrial(name, kind, recorded.time_s, places, seen, arms)
 
 
 def marker_set(cohort: Cohort, specimen: str) -> MarkerSet:

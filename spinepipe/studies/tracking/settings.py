@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, Field, WithJsonSchema
 
+from spinepipe.motion.joint_tables import USUAL_SHARES
 from spinepipe.problems import did_you_mean, one_of
 from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
@@ -201,7 +202,7 @@ class Tracking(Study):
         description="of the zero-phase low-pass filter that Plug-in-Gait markers go through",
     )
     ratios: str = Field(
-        default="christophy_2012",
+        default=USUAL_SHARES,
         pattern="^[a-z0-9_]+$",
         description="set of ratios that shares what turns between pelvis and thorax among joints, "
         "with Plug-in-Gait",

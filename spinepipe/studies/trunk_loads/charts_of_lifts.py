@@ -58,22 +58,17 @@ def over_time(study: TrunkLoads, cohort: Cohort, tables: Tables) -> Chart:
             lost = lost or len(weak) > 0
             if column == COMPRESSION:
                 line = _with_band(line, of_lift(tables["lift_bands"], *lift), level, start)
-            frames += [line.assign(series=name), weak]
-        ends = [
-            float(end)
-            for end in (
-                min(f["x"].min() for f in frames if len(f)),
-                max(f["x"].max() for f in frames if len(f)),
-            )
-        ]
+            frames += [one for one in (line.assign(series=name), weak) if len(one)]
         if column == COMPRESSION:
-            frames.append(pd.DataFrame({"x": ends, "y": [GUIDELINE_N] * 2, "series": "limit"}))
+            x = pd.concat(frames)["x"]
+            ends = {"x": [x.min(), x.max()], "y": GUIDELINE_N, "series": "limit"}
+            frames.append(pd.DataFrame(ends))
         panels.append(
             Curves(
                 title=heading,
                 x_label="time since the load left the floor (s)" if known else "time (s)",
                 y_label=words,
-                frame=pd.concat([one for one in frames if len(one)], ignore_index=True),
+                frame=pd.concat(frames, ignore_index=True),
                 looks={**looks, "limit": LIMIT, "": NOT_HELD},
                 points=("",),
                 width=400.0,

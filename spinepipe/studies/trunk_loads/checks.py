@@ -10,6 +10,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.documents.inside import outside
 from spinepipe.documents.names import name_fault
 from spinepipe.documents.yaml_text import YamlDocument
+from spinepipe.motion.smoothing import USUAL_CUTOFF_HZ
 from spinepipe.muscles.folder import PELVIS, SHEATH, in_ground
 from spinepipe.muscles.myo_sim import PACKAGE, REMEDY, VERSION, NoSource
 from spinepipe.muscles.regressions import PACKAGED
@@ -17,9 +18,10 @@ from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES, SLICES
 from spinepipe.plausibility.warnings.columns import beyond_ranges
 from spinepipe.plausibility.warnings.warning import PlausibilityWarning
 from spinepipe.problems import InputError, InputProblem, Spelling, did_you_mean, one_of
-from spinepipe.studies.places import unknown_names
+from spinepipe.studies.checks_of_recorded import recorded_problems
+from spinepipe.studies.places import lacking_tables, unknown_names
 from spinepipe.studies.plausibility import subject_doubts
-from spinepipe.studies.recordings import TRIALS
+from spinepipe.studies.recordings import TRIALS, row_problems
 from spinepipe.studies.subjects import HEIGHT_CM, SUBJECTS, subject_problems
 from spinepipe.studies.trunk_loads.checks_of_tasks import task_problems
 from spinepipe.studies.trunk_loads.forms import MUSCLE_PARAMETERS, MUSCLES, TASKS
@@ -43,11 +45,7 @@ def check_trunk(
     """Everything that is wrong with the subjects, tasks and muscles of a cohort."""
     further = cohort.further
     needed = (SUBJECTS, TRIALS) if study.motions.trials else (SUBJECTS, TASKS)
-    for form in needed:
-        if form.stem not in further:
-            found, allowed = f"a cohort without {form.file}", f"a cohort with {form.file}"
-            remedy = f"add {form.file}, or name another cohort"
-            yield InputProblem(*document.place_of("cohort"), found, allowed, remedy)
+    yield from lacking_tables(document, needed, cohort)
     if "subjects" in further:
         yield from subject_problems(cohort, further["subjects"])
     if "tasks" in further:
@@ -64,6 +62,7 @@ def check_trunk(
     if study.motions.trials and TRIALS.stem in further:
         known = list(dict.fromkeys(further[TRIALS.stem]["trial"].astype(str)))
         yield from unknown_names(document, "motions.trials", "trial", study.motions.trials, known)
+        yield from row_problems(cohort)
     if study.geometry == "cohort":
         yield from _without_geometry(document, cohort)
         yield from _several_trunks(cohort)
@@ -84,6 +83,14 @@ def check_source(
     except ValueError as error:
         allowed = "a trunk from S1 to T1 with its muscles"
         yield InputProblem(*place, str(error), allowed, f"complete the files of {cohort.name}")
+
+
+def check_lifts(
+    _document: YamlDocument, study: TrunkLoads, cohort: Cohort, _root: Path
+) -> Iterator[InputProblem]:
+    """Refuse recordings that are not what their tables say; nothing where no lift is asked for."""
+    if study.motions.trials and TRIALS.stem in cohort.further and not any(row_problems(cohort)):
+        yield from recorded_problems(cohort, USUAL_CUTOFF_HZ)
 
 
 def _without_geometry(document: YamlDocument, cohort: Cohort) -> Iterator[InputProblem]:

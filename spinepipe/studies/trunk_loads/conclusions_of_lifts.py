@@ -8,6 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import plain
 from spinepipe.status import Balanced
+from spinepipe.studies.trunk_loads.conclusions_of_trust import people_mpa
 from spinepipe.studies.trunk_loads.lift_rows import (
     GUIDELINE_N,
     L4L5,
@@ -53,7 +54,8 @@ def of_lifts(
         rebuilt = "rebuilt" if cohort.rebuilt else "scaled"
         yield Conclusion("bodies_from", f"check_{rebuilt}")
         yield Conclusion("bodies", rebuilt)
-    values = numbers_from("lift_loads", lifts=len(lifts), frames=_frames(tables["lift_loads"]))
+    frames = int((tables["lift_loads"]["level"] == L4L5).sum())
+    values = numbers_from("lift_loads", lifts=len(lifts), frames=frames)
     values |= numbers_from("settings: motions", samples=study.motions.samples)
     drawn = "sampled" if study.motions.samples else "single"
     yield Conclusion("lift_methods", f"alone_{drawn}" if alone else drawn, values)
@@ -69,7 +71,9 @@ def _largest(found: list[LargestLoad], loads: pd.DataFrame, alone: bool) -> Iter
     newtons = float(most.row["compression_n"])
     load = Value(newtons, "N", source=_SOURCE)
     if most.band:
-        ends, n = (float(most.band["low"]), float(most.band["high"])), int(most.band["n_samples"])
+        low, high = most.band["low"], most.band["high"]
+        ends = float(low), None if pd.isna(high) else float(high)
+        n = int(most.band["n_samples"] + most.band["n_failed"])
         load = Value(newtons, "N", *ends, n, f"{_SOURCE}; lift_bands")
     apart = float(round(100.0 * (newtons / GUIDELINE_N - 1.0)))
     values = {
@@ -90,17 +94,14 @@ def _largest(found: list[LargestLoad], loads: pd.DataFrame, alone: bool) -> Iter
     if not alone or side == "open":
         return
     pressure = Value(float(most.row["pressure_mpa"]), "MPa", source="lift_loads: pressure_mpa")
-    yield Conclusion("lift_pressure", "most", {"value": pressure}, names)
+    inside = "inside" if most.row["inside_eq_6"] else "beyond"
+    yield Conclusion("lift_pressure", inside, {"value": pressure}, names)
     if most.after_s is not None:
         verdict = "after" if most.after_s >= 0.0 else "before"
         when = Value(round(abs(most.after_s), 2), "s", source="lift_frames: load_n")
         yield Conclusion("lift_time", verdict, {"value": when}, names)
     told = {"value": values["apart"], "limit": values["limit"]}
     yield Conclusion("lift_limit", side, told, names)
-
-
-def _frames(loads: pd.DataFrame) -> int:
-    return int((loads["level"] == L4L5).sum())
 
 
 def _held(loads: pd.DataFrame, asked_mpa: float) -> Iterator[Conclusion]:
@@ -122,12 +123,14 @@ def _held(loads: pd.DataFrame, asked_mpa: float) -> Iterator[Conclusion]:
 
 
 def _bands(bands: pd.DataFrame) -> Iterator[Conclusion]:
-    """How many persons that were drawn do not hold a frame."""
+    """How many persons that were drawn do not hold a frame, or at more stress than people have."""
     rows = bands[bands["level"] == L4L5] if len(bands) else bands
     if rows.empty:
         return
     lost, n = int(rows["n_failed"].sum()), int((rows["n_failed"] + rows["n_samples"]).sum())
     values = numbers_from("lift_bands", lost=lost, samples=n)
-    values |= numbers_from("lift_bands", frames=len(rows), without=int(rows["low"].isna().sum()))
-    verdict = "stop" if rows["low"].isna().any() else "check" if lost else "ok"
+    values |= numbers_from("lift_bands", frames=len(rows), without=int(rows["high"].isna().sum()))
+    values |= numbers_from("lift_bands", above=int(rows["n_above"].sum())) | people_mpa()
+    verdict = "check" if lost or values["above"].number else "ok"
+    verdict = "check_open" if rows["high"].isna().any() else verdict
     yield Conclusion("lift_bands", verdict, values)

@@ -9,7 +9,8 @@ from spinepipe.report.conclusions import Conclusion, Value, numbers_from
 from spinepipe.report.words import listed, plain
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.measured import FEWEST, counted_and_held, error
-from spinepipe.studies.trunk_loads.samples import LEAST_SAMPLES, Tables, lost_and_all, shares
+from spinepipe.studies.trunk_loads.samples import Tables, lost_and_all, shares
+from spinepipe.studies.trunk_loads.sampling import LEAST_SAMPLES
 from spinepipe.studies.trunk_loads.selection import (
     COMPRESSION,
     PRESSURE,

@@ -11,7 +11,7 @@ from spinepipe.studies.kind import Job, Kind, ignoring
 from spinepipe.studies.recordings import RECORDED, motion_digests
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
-from spinepipe.studies.trunk_loads.checks import check_source, check_trunk
+from spinepipe.studies.trunk_loads.checks import check_lifts, check_source, check_trunk
 from spinepipe.studies.trunk_loads.forms import GEOMETRY_FORMS, TASKS
 from spinepipe.studies.trunk_loads.persons import extra_inputs
 from spinepipe.studies.trunk_loads.sampling import batches, sampled_specimens
@@ -190,7 +190,7 @@ KIND = Kind(
     settings=TrunkLoads,
     files=TrunkFiles,
     checks=(check_trunk,),
-    checks_at_start=(check_source,),
+    checks_at_start=(check_source, check_lifts),
     tables=all_declared(__file__),
     jobs=(
         Job("hold", ignores=_NO_TASK_OF_ITS_OWN, also=_source),

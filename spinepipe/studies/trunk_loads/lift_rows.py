@@ -68,4 +68,5 @@ def largest_load(tables: Tables, specimen: str, trial: str) -> LargestLoad | Non
         bands = bands[(bands["level"] == L4L5) & (bands["time_s"] == row["time_s"])]
     off = lift_off_s(of_lift(tables["lift_frames"], specimen, trial))
     after = None if off is None else float(row["time_s"]) - off
-    return LargestLoad(row, named(bands.dropna())[0] if len(bands.dropna()) else {}, after)
+    known = bands.dropna(subset="low") if len(bands) else bands
+    return LargestLoad(row, named(known)[0] if len(known) else {}, after)

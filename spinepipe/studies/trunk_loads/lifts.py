@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
@@ -20,7 +21,7 @@ from spinepipe.motion.recorded_motion import RecordedMotion
 from spinepipe.motion.standing_spine import standing_spine
 from spinepipe.muscles.muscle_equilibrium import L4L5, SolvedTask, SolverOptions
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.strength import HeldTask, hold_task
+from spinepipe.muscles.strength import HIGHEST_PA, HeldTask, Least, hold_task
 from spinepipe.muscles.task import Instant, Task
 from spinepipe.muscles.trunk import BODIES, LEVELS, body_of
 from spinepipe.progress import Progress
@@ -34,22 +35,19 @@ from spinepipe.studies.trunk_loads.persons import (
     extra_inputs,
     solver_options,
 )
-from spinepipe.studies.trunk_loads.postures import between, shares
+from spinepipe.studies.trunk_loads.postures import leaning_deg
 from spinepipe.studies.trunk_loads.rows import Row, TaskOutcome, level_rows, path_rows
-from spinepipe.studies.trunk_loads.sampling import values_at
+from spinepipe.studies.trunk_loads.sampling import censored_quantile, values_at
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
-from spinepipe.studies.trunk_loads.spread import LEAST_SAMPLES, MOST_FAILED
-from spinepipe.studies.trunk_loads.tables import LIFT_BANDS, LIFT_FRAMES, LIFT_LOADS, LIFT_PATHS
+from spinepipe.studies.trunk_loads.tables import PER_LIFT
 from spinepipe.tables import from_rows, write
-from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
+from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
 LIFTED = "load"
 """Part of a recorded motion that is no part of the body."""
 
 MOST_DRAWN = 25
 """Frames of the animation; more are thinned out evenly, but for the one with the largest load."""
-
-PER_LIFT = (LIFT_LOADS, LIFT_FRAMES, LIFT_BANDS, LIFT_PATHS)
 
 
 def run(root: str, study: str, specimen: str, trial: str, **paths: str) -> None:
@@ -69,16 +67,10 @@ def run(root: str, study: str, specimen: str, trial: str, **paths: str) -> None:
 
 
 def lift_of(cohort: Cohort, specimen: str, trial: str, person: Person) -> RecordedMotion:
-    """A recorded lift of the spine whose joints and slices the muscles hold.
-
-    Joints share what the trunk bends against the pelvis as they do in tasks: ligaments, which are
-    steep at the end of a joint's range, are made for that.
-    """
-    trunk, sharing = person.lines.trunk, np.zeros((len(skeleton.JOINTS), len(ROTATIONS)))
-    for column, axis in enumerate(ROTATIONS):
-        sharing[: len(LEVELS), column] = shares(axis)
-    spine = standing_spine(person.subject, trunk, person.chain, person.upright, person.masses)
-    return recorded_motion(cohort, specimen, trial, spine, shares=sharing)
+    """A recorded lift of the spine whose joints and slices the muscles hold."""
+    trunk, upright = person.lines.trunk, person.upright
+    spine = standing_spine(person.subject, trunk, person.chain, upright, person.masses)
+    return recorded_motion(cohort, specimen, trial, spine)
 
 
 def rows_of(
@@ -86,7 +78,7 @@ def rows_of(
 ) -> dict[str, list[Row]]:
     """Rows of each table, by its name."""
     asked, options = settings.motions, solver_options(settings)
-    frames = np.arange(0, len(motion.time_s), asked.every)
+    frames = np.arange(0, len(motion.time_s), asked.every, dtype=np.int64)
     tasks = tasks_of(motion, frames, 1e6 * asked.largest_stress_mpa)
     person, found = stands.person, dict[str, list[Row]]()
     outcomes = [
@@ -112,7 +104,10 @@ def rows_of(
 
 
 def tasks_of(
-    motion: RecordedMotion, frames: Array, stress_pa: float, values: Values | None = None
+    motion: RecordedMotion,
+    frames: NDArray[np.int64],
+    stress_pa: float,
+    values: Values | None = None,
 ) -> list[Task]:
     """Frames of a motion as tasks.
 
@@ -125,11 +120,17 @@ def tasks_of(
     known = values or {}
     rows = [skeleton.BODIES.index(name) for name in BODIES]
     carriers = np.array([body_of(name) for name in motion.loads.carriers])
-    lean = between(
-        known.get("pelvis_extension_deg", 0.0), known.get("trunk_extension_deg", 0.0), "extension"
-    )
-    leaning = np.array([rotation_zxy(rad, 0.0, 0.0) for rad in (lean / DEG_PER_RAD).tolist()])
-    turned = motion.rotations[:, rows] @ np.swapaxes(motion.standing[rows], -1, -2)
+    pelvis, trunk = (known.get(f"{part}_extension_deg", 0.0) for part in ("pelvis", "trunk"))
+    turned = motion.rotations[:, rows]
+    bent = np.swapaxes(turned[:, -1], -1, -2) @ turned[:, 0]  # the trunk against the pelvis
+    flexion_deg = DEG_PER_RAD * np.arctan2(bent[:, 1, 0], bent[:, 0, 0])
+    leaning = {
+        f: [
+            rotation_zxy(rad, 0, 0)
+            for rad in leaning_deg(pelvis, trunk, flexion_deg[f]) / DEG_PER_RAD
+        ]
+        for f in frames.tolist()
+    }
     at = motion.loads.at - motion.l5s1[:, None]
     return [
         Task(
@@ -140,7 +141,7 @@ def tasks_of(
             pressure_pa=1e3 * known.get("pressure_kpa", 0.0),
             stress_pa=stress_pa + 1e6 * known.get("largest_stress_mpa", 0.0),
             instant=Instant(
-                leaning @ turned[f],
+                np.array(leaning[f]) @ turned[f],
                 carriers,
                 at[f],
                 motion.loads.forces[f],
@@ -152,12 +153,16 @@ def tasks_of(
 
 
 def held_in_turn(
-    person: Person, tasks: Sequence[Task], options: SolverOptions
+    person: Person,
+    tasks: Sequence[Task],
+    options: SolverOptions,
+    least: Least = "of_posture",
+    highest_pa: float = HIGHEST_PA,
 ) -> Iterator[HeldTask]:
     """Tasks that follow each other closely, each begun where the one before ended."""
     before = None
     for task in tasks:
-        held = hold_task(person, task, options, nearby=before)
+        held = hold_task(person, task, options, least, before, highest_pa)
         before = held.solved
         yield held
 
@@ -169,12 +174,13 @@ def _load_rows(outcome: TaskOutcome) -> Iterator[Row]:
     least = outcome.held.least_pa if outcome.held else None
     of_all = {"least_stress_mpa": least and 1e-6 * least, "message": outcome.message}
     for row in level_rows(outcome):
-        own = {"pressure_mpa": 1e-6 * pressure.pa} if row["level"] == LEVELS[L4L5] else {}
+        own = {"pressure_mpa": 1e-6 * pressure.pa, "inside_eq_6": bool(pressure.inside)}
+        own = own if row["level"] == LEVELS[L4L5] else {}
         yield row | of_all | own
 
 
 def _frame_rows(
-    motion: RecordedMotion, frames: Array, outcomes: Sequence[TaskOutcome]
+    motion: RecordedMotion, frames: NDArray[np.int64], outcomes: Sequence[TaskOutcome]
 ) -> Iterator[Row]:
     names = motion.loads.names
     lifted = names.index(LIFTED) if LIFTED in names else None
@@ -189,34 +195,40 @@ def _frame_rows(
 
 def _compression(solved: SolvedTask | None) -> float:
     """N, of L4L5; of frames that are not held nought."""
-    held = solved is not None and solved.status in HELD
-    return float(solved.compression[L4L5]) if held else 0.0
+    if solved is None or solved.status not in HELD:
+        return 0.0
+    return float(solved.compression[L4L5])
 
 
 def _samples(
     settings: TrunkLoads,
     stands: UprightPerson,
     motion: RecordedMotion,
-    frames: Array,
+    frames: NDArray[np.int64],
     progress: Progress,
 ) -> tuple[Array, Array]:
-    """(S, N, 7) N compression of persons drawn by the uncertain inputs, and (S, N) whether held."""
+    """(S, N, 7) N compression of persons drawn by the uncertain inputs, and (S, N) Pa, largest
+    stress that muscles were allowed; infinite where the frame is not held.
+
+    The person did lift: who is drawn too weak for it has the loads at the stress that it takes.
+    """
     asked, options = settings.motions, solver_options(settings)
-    found, held = list[list[Array]](), list[list[bool]]()
     drawn = list[Values]()
     if asked.samples:
         factors = list(settings.uncertain.factors)
         design = draw("latin_hypercube", factors, asked.samples, settings.uncertain.seed)
         drawn = [dict(zip(factors, row, strict=True)) for row in values_at(settings, design)]
-    for values in progress.through(drawn, f"{motion.name}: persons drawn"):
+    compression = np.zeros((len(drawn), len(frames), len(LEVELS)))
+    stress = np.full(compression.shape[:2], np.inf)
+    numbered = progress.through(list(enumerate(drawn)), f"{motion.name}: persons drawn")
+    for s, values in numbered:
         person = stands.varied(values)
         sized = of_mass(motion, person.subject.mass_kg / stands.subject.mass_kg)
         tasks = tasks_of(sized, frames, 1e6 * asked.largest_stress_mpa, values)
-        solved = [one.solved for one in held_in_turn(person, tasks, options)]
-        found.append([one.compression for one in solved])
-        held.append([one.status in HELD for one in solved])
-    shape = (len(found), len(frames))
-    return np.reshape(found, (*shape, len(LEVELS))), np.reshape(held, shape).astype(bool)
+        for f, one in enumerate(held_in_turn(person, tasks, options, "untold", np.inf)):
+            if one.solved.status in HELD:
+                compression[s, f], stress[s, f] = one.solved.compression, one.task.stress_pa
+    return compression, stress
 
 
 def of_mass(motion: RecordedMotion, times: float) -> RecordedMotion:
@@ -229,21 +241,20 @@ def of_mass(motion: RecordedMotion, times: float) -> RecordedMotion:
     )
 
 
-def band_rows(times: Array, compression: Array, held: Array) -> Iterator[Row]:
-    if not len(held):
+def band_rows(times: Array, compression: Array, stress: Array) -> Iterator[Row]:
+    if not len(stress):
         return
     for k, time in enumerate(times.tolist()):
-        good = compression[held[:, k], k]
-        lost = len(held) - len(good)
-        enough = len(good) >= LEAST_SAMPLES and lost <= MOST_FAILED * len(held)
+        held = np.isfinite(stress[:, k])
+        lost = int((~held).sum())
         for level, name in enumerate(LEVELS):
-            ends = (
-                np.quantile(good[:, level], [0.025, 0.5, 0.975]).tolist() if enough else [None] * 3
-            )
+            known = compression[held, k, level]
+            ends = [censored_quantile(known, lost, p) for p in (0.025, 0.5, 0.975)]
             yield {
                 "time_s": time,
                 "level": name,
                 **dict(zip(("low", "median", "high"), ends, strict=True)),
-                "n_samples": len(good),
+                "n_samples": len(known),
                 "n_failed": lost,
+                "n_above": int((stress[held, k] > HIGHEST_PA).sum()),
             }

@@ -19,6 +19,7 @@ from spinepipe.studies.trunk_loads.tables import (
     DRIVERS,
     INTERVALS,
     LEVELS_TABLE,
+    PER_LIFT,
     PRESSURES,
     REMARKS,
     SIMPLIFIED,
@@ -62,7 +63,7 @@ SHOWN: Mapping[Table, tuple[str, str]] = {
 
 READ = (
     *(table.name for table in SHOWN),
-    *("lift_loads", "lift_frames", "lift_bands", "lift_paths"),
+    *(table.name for table in PER_LIFT),
     *("muscles", "upright", "design", "responses", "paths", "against_ghezelbash_2016"),
 )
 """Tables whose rows the page needs; of the others it tells where they come from."""

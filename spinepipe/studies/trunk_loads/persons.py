@@ -19,7 +19,6 @@ from spinepipe.muscles.passive_tissue import (
     AXIAL_N_PER_M,
     CURVES,
     LIGAMENTS_BESIDE_LOWEST,
-    LUMBAR_FLEXION_DEG,
     T11T12_WITH_RIBS,
     JointLaws,
     Ligaments,
@@ -43,7 +42,7 @@ from spinepipe.muscles.trunk import BODIES, LEVELS, Trunk
 from spinepipe.muscles.trunk_source import Source
 from spinepipe.muscles.upright import Upright, upright
 from spinepipe.studies.subjects import subject_of
-from spinepipe.studies.trunk_loads.postures import between, shares
+from spinepipe.studies.trunk_loads.postures import FULL_FLEXION_DEG, leaning_deg, shares
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.units import DEG_PER_RAD, MM_PER_M
 
@@ -189,9 +188,7 @@ def laws_of(settings: TrunkLoads, source: Trunk, size: BeamRatios, values: Value
     if not with_ribs:
         angular[-1] *= [upper.angular, upper.torsion, upper.angular]
     angular *= values.get("passive_rotation", 1.0)
-    # joints share full flexion as they share any
-    shared = shares("extension")
-    full = LUMBAR_FLEXION_DEG / DEG_PER_RAD * shared / shared[:-1].sum()
+    full = FULL_FLEXION_DEG / DEG_PER_RAD * shares("extension")
     beside = np.array([LIGAMENTS_BESIDE_LOWEST[level] for level in LEVELS])
     beside[-1] *= not with_ribs  # a whole segment has its own
     ligaments = Ligaments(passive.ligaments_nm * angular[0, 2] * beside, full)
@@ -231,7 +228,8 @@ def vary_task(task: Task, values: Values) -> Task:
     pelvis = values.get("pelvis_extension_deg", 0.0) if bent else 0.0
     trunk = values.get("trunk_extension_deg", 0.0)
     turned = task.turned.copy()
-    turned[:, 0] += between(pelvis, trunk, "extension") / DEG_PER_RAD
+    flexion = DEG_PER_RAD * float(task.turned[0, 0] - task.turned[-1, 0])
+    turned[:, 0] += leaning_deg(pelvis, trunk, flexion) / DEG_PER_RAD
     return replace(
         task,
         hands=hands,

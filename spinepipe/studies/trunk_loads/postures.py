@@ -19,15 +19,25 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.facts import number, numbers, several
+from spinepipe.motion.joint_tables import USUAL_SHARES, ratio_sets
+from spinepipe.muscles.passive_tissue import LUMBAR_FLEXION_DEG
 from spinepipe.muscles.task import Exertion, Hands, Task
 from spinepipe.muscles.trunk import BODIES
 from spinepipe.studies.trunk_loads.forms import FORCE, HANDS, PUSH_N, PUSH_NM, TASKS, UPRIGHT, turn
 from spinepipe.studies.trunk_loads.settings import TrunkAngle
 from spinepipe.units import DEG_PER_RAD, MM_PER_M, ROTATIONS
 
-FLEXION_PERCENT = numbers(__name__, "flexion_percent")
-LATERAL_PERCENT = numbers(__name__, "lateral_percent")
-"""L5S1 to T11T12."""
+_SHARES = ratio_sets()[USUAL_SHARES][: len(BODIES) - 1]
+
+
+def shares(axis: str) -> Array:
+    """(7,) share of each level in the rotation between pelvis and trunk, L5S1 to T11T12."""
+    found: Array = _SHARES[:, ROTATIONS.index(axis)]
+    return found / found.sum()
+
+
+FULL_FLEXION_DEG = LUMBAR_FLEXION_DEG / float(1.0 - shares("extension")[-1])
+"""Of T11 against the pelvis: joints share it as they share any."""
 
 _LARGEST = numbers(__name__, "largest_bend")
 THORAX_DEG = _LARGEST["thorax"]
@@ -50,13 +60,6 @@ USUAL_STRESS_MPA = number(__name__, "usual_muscle_stress")
 USUAL_VERTEBRA = "T9"
 
 
-def shares(axis: str) -> Array:
-    """(7,) share of each level in the rotation between pelvis and trunk, L5S1 to T11T12."""
-    percent = np.array([*(FLEXION_PERCENT if axis == "extension" else LATERAL_PERCENT).values()])
-    found: Array = percent / percent.sum()
-    return found
-
-
 def between(pelvis: float, trunk: float, axis: str) -> Array:
     """(8,) rotation of each body, S1 to T11, in the unit of the two that are given.
 
@@ -66,6 +69,21 @@ def between(pelvis: float, trunk: float, axis: str) -> Array:
     passed = np.concatenate([[0.0], np.cumsum(shares(axis))])
     found: Array = pelvis + (trunk - pelvis) * passed
     return found
+
+
+def leaning_deg(pelvis: float, trunk: float, flexion: float) -> Array:
+    """(8,) deg, extension of each body that a sample adds to a posture.
+
+    Nobody bends farther than ligaments let them: what pelvis and trunk would add beyond full
+    flexion of the joints between them, the pelvis turns less.
+
+    Parameters
+    ----------
+    pelvis, trunk : deg, extension that is drawn. flexion : deg, of the trunk against the pelvis,
+        without it.
+    """
+    room = max(FULL_FLEXION_DEG - flexion, 0.0)
+    return between(pelvis - max(pelvis - trunk - room, 0.0), trunk, "extension")
 
 
 def rhythm(trunk_deg: float, means: TrunkAngle) -> tuple[float, float]:

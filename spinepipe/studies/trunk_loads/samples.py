@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.report.conclusions import Value
+from spinepipe.studies.trunk_loads.sampling import LEAST_SAMPLES
 from spinepipe.studies.trunk_loads.selection import AnsweredTask, Row, named, of_task, sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 
 Tables = Mapping[str, pd.DataFrame]
 
-LEAST_SAMPLES = 20
 MOST_LOST = 0.2
 """Share of samples above which nothing is told of those that are left."""
 

@@ -1,4 +1,4 @@
-"""The design of uncertain inputs of a study, and how its samples are cut into batches."""
+"""The design of uncertain inputs, its batches, and quantiles of what samples gave."""
 
 import numpy as np
 
@@ -6,6 +6,9 @@ from spinepipe.effects.contract import Array
 from spinepipe.sensitivity_analysis.global_indices.design import Design, draw
 from spinepipe.sensitivity_analysis.global_indices.spread import Normal, values_of
 from spinepipe.studies.trunk_loads.settings import FACTOR_UNITS, NOMINAL, TrunkLoads
+
+LEAST_SAMPLES = 20
+"""Below that no interval is given."""
 
 SMALLEST_FACTOR = 0.3
 """Of a factor that is drawn: below that the model is another."""
@@ -41,3 +44,18 @@ def batches(settings: TrunkLoads) -> int:
 def sampled_specimens(settings: TrunkLoads, specimens: tuple[str, ...]) -> tuple[str, ...]:
     """Persons that are sampled."""
     return settings.uncertain.specimens or specimens[:1]
+
+
+def censored_quantile(values: Array, beyond: int, p: float) -> float | None:
+    """Quantile of values and of so many of which is known that they are farther from nought.
+
+    None where it lies among those, or where values are fewer than `LEAST_SAMPLES`.
+    """
+    if len(values) < LEAST_SAMPLES:
+        return None
+    away = -1.0 if np.median(values) < 0.0 else 1.0
+    known = np.sort(values)
+    at = p * (len(values) + beyond - 1) - (beyond if away < 0.0 else 0)
+    if not 0.0 <= at <= len(values) - 1:
+        return None
+    return float(np.interp(at, np.arange(len(values)), known))

@@ -9,7 +9,15 @@ import pandas as pd
 from spinepipe.cohort import Cohort
 from spinepipe.effects.contract import Array
 from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import Muscle, Scene, SceneLoad, SceneStep, bodies_at, posed_axes
+from spinepipe.report.viewer.scene import (
+    Muscle,
+    Scene,
+    SceneBody,
+    SceneLoad,
+    SceneStep,
+    bodies_at,
+    posed_axes,
+)
 from spinepipe.report.words import capital, count, fixed, number, plain
 from spinepipe.studies.trunk_loads.forms import HANDS
 from spinepipe.studies.trunk_loads.words import ENDED, newton
@@ -68,13 +76,7 @@ def _scene(
     drawn = [str(task) for task in dict.fromkeys(paths["task"]) if task in tasks]
     order = [*drawn, *(task for task in tasks if task not in drawn)]
     start = poses_between(tasks[order[0]][1])
-    axes = posed_axes(start)
-    joints = [
-        Endplate(centre, posed_axes(0.5 * (start[k : k + 1] + start[k + 1 : k + 2]))[0])
-        for k, centre in enumerate(tasks[order[0]][1])
-    ]
-    meshes = spine_meshes(cohort.vertebrae, joints)
-    bodies = bodies_at(cohort.vertebrae, meshes, start[:, :3], axes)
+    bodies = spine_bodies(cohort.vertebrae, tasks[order[0]][1], start)
     top_mpa, top_n = top
     asked = cohort.further.get("tasks", pd.DataFrame())
     steps = []
@@ -91,6 +93,14 @@ def _scene(
             SceneStep(capital(plain(task)), says, poses, loads=loads, disc=disc, muscles=muscles)
         )
     return Scene(person, "Task", bodies, steps, caption, one_scale=False)
+
+
+def spine_bodies(vertebrae: Sequence[str], centres: Array, poses: Array) -> list[SceneBody]:
+    """Vertebrae as large as the gaps between joints (J, 3) mm ask for, in poses (J + 1, 6)."""
+    middle = posed_axes(0.5 * (poses[:-1] + poses[1:]))
+    joints = [Endplate(at, turn) for at, turn in zip(centres, middle, strict=True)]
+    meshes = spine_meshes(vertebrae, joints)
+    return bodies_at(vertebrae, meshes, poses[:, :3], posed_axes(poses))
 
 
 def poses_between(centres: Array) -> Array:
@@ -142,21 +152,31 @@ def _loads_in_words(rows: pd.DataFrame, vertebrae: Sequence[str]) -> str:
     """Largest compression and its level; and how the task ended where it did not converge."""
     sides = dict(zip(rows.index, pairwise(vertebrae), strict=True))
     loads = rows["compression_n"].dropna()
-    ended = [ENDED[s] for s in rows["status"].dropna().unique() if s in ENDED]
-    doubt = f" Do not use: it ended {ended[0]}." if ended else ""
     if loads.empty:
-        return f"No forces were found.{doubt}"
+        return f"No forces were found.{doubt(rows)}"
     lower, upper = sides[str(loads.idxmax())]
     level = f"{upper}–{lower}"
-    return f"Largest compression {newton(float(loads.max()))}, at {level}.{doubt}"
+    return f"Largest compression {newton(float(loads.max()))}, at {level}.{doubt(rows)}"
+
+
+def doubt(rows: pd.DataFrame) -> str:
+    """How rows of table levels or lift_loads ended where their numbers are no solution."""
+    ended = [ENDED[status] for status in rows["status"].dropna().unique() if status in ENDED]
+    return f" Do not use: it ended {ended[0]}." if ended else ""
+
+
+def scales(top_mpa: float, top_n: float) -> str:
+    """What discs and lines stand for."""
+    return (
+        f"Discs: the warmer, the more compression (up to {newton(top_n)}). Lines: muscles, the "
+        f"wider and darker, the more stress (up to {fixed(top_mpa)} MPa"
+    )
 
 
 def _caption(top_mpa: float, top_n: float, shown: int, every: int) -> str:
     more = f" The first {shown} of {count(every, 'person')}." if every > shown else ""
     return (
-        f"Discs: the warmer, the more compression (up to {newton(top_n)}). Lines: muscles, the "
-        f"wider and darker, the more stress (up to {fixed(top_mpa)} MPa; in print, those above a "
-        "tenth of it); one scale for all. "
+        f"{scales(top_mpa, top_n)}; in print, those above a tenth of it); one scale for all. "
         "Vertebrae are schematic, lie between joint centres and are drawn without twist; ribs, "
         f"arms and head are not drawn.{more}"
     )

@@ -4,19 +4,19 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.muscles.trunk import BODIES, LEVELS
-from spinepipe.report.viewer.meshes import Endplate, spine_meshes
-from spinepipe.report.viewer.scene import (
-    Course,
-    Scene,
-    SceneStep,
-    bodies_at,
-    posed_axes,
-)
+from spinepipe.report.viewer.scene import Course, Scene, SceneStep
 from spinepipe.report.words import capital, fixed, plain
 from spinepipe.studies.trunk_loads.lift_rows import L4L5, lifts_of, of_lift
 from spinepipe.studies.trunk_loads.samples import Tables
-from spinepipe.studies.trunk_loads.scenes import LEAST_MPA, muscle_lines, poses_between
-from spinepipe.studies.trunk_loads.words import ENDED, newton
+from spinepipe.studies.trunk_loads.scenes import (
+    LEAST_MPA,
+    doubt,
+    muscle_lines,
+    poses_between,
+    scales,
+    spine_bodies,
+)
+from spinepipe.studies.trunk_loads.words import newton
 
 MOST_LIFTS = 4
 """A frame takes some 10 kB of the page."""
@@ -38,31 +38,29 @@ def lift_scenes(tables: Tables) -> list[Scene]:
     top_mpa = max(LEAST_MPA, float(paths["stress_mpa"].max()))
     top_n = max(1.0, float(loads["compression_n"].max()))
     caption = (
-        f"Discs: the warmer, the more compression (up to {newton(top_n)}). Lines: muscles, the "
-        f"wider and darker, the more stress (up to {fixed(top_mpa)} MPa). "
+        f"{scales(top_mpa, top_n)}). "
         "Curve: compression of L4–L5. Vertebrae from T10 up, ribs, arms, head and load are "
         "not drawn; vertebrae are schematic and drawn without twist."
     )
     several = len({specimen for specimen, _ in lifts}) > 1
     found = []
     for specimen, trial in lifts:
-        own = [
-            of_lift(tables[name], specimen, trial)
-            for name in ("lift_loads", "lift_frames", "lift_paths")
-        ]
+        own = {
+            name: of_lift(tables[f"lift_{name}"], specimen, trial)
+            for name in ("loads", "frames", "paths")
+        }
         title = f"{specimen}, {plain(trial)}" if several else capital(plain(trial))
-        found.append(_scene(title, *own, (top_mpa, top_n), caption))
+        found.append(_scene(title, own, (top_mpa, top_n), caption))
     return found
 
 
 def _scene(
     title: str,
-    loads: pd.DataFrame,
-    frames: pd.DataFrame,
-    paths: pd.DataFrame,
+    own: dict[str, pd.DataFrame],
     top: tuple[float, float],
     caption: str,
 ) -> Scene:
+    loads, frames, paths = own.values()
     top_mpa, top_n = top
     by_time = dict(iter(loads.groupby("time_s")))
     borne = frames.set_index("time_s")
@@ -73,10 +71,7 @@ def _scene(
         centres = rows[_XYZ].to_numpy(float)
         poses = poses_between(centres)
         if bodies is None:
-            axes = posed_axes(poses)
-            middle = posed_axes(0.5 * (poses[:-1] + poses[1:]))
-            joints = [Endplate(at, turn) for at, turn in zip(centres, middle, strict=True)]
-            bodies = bodies_at(BODIES, spine_meshes(BODIES, joints), poses[:, :3], axes)
+            bodies = spine_bodies(BODIES, centres, poses)
         steps.append(
             SceneStep(
                 f"{fixed(float(time))} s",
@@ -86,20 +81,18 @@ def _scene(
                 muscles=muscle_lines(lines.get(time, paths.iloc[:0]), top_mpa),
             )
         )
-    own = loads[loads["level"] == L4L5].sort_values("time_s")
+    course_of = loads[loads["level"] == L4L5].sort_values("time_s")
     course = Course(
-        own["time_s"].to_numpy(float),
-        own["compression_n"].to_numpy(float),
+        course_of["time_s"].to_numpy(float),
+        course_of["compression_n"].to_numpy(float),
         paths["time_s"].unique().astype(float),
-        f"compression of L4–L5, up to {newton(float(own['compression_n'].max()))}",
+        f"compression of L4–L5, up to {newton(float(course_of['compression_n'].max()))}",
     )
     return Scene(title, "Time", bodies or (), steps, caption, pause_ms=140, course=course)
 
 
 def _says(time_s: float, rows: pd.DataFrame, frame: pd.Series) -> str:
-    load = newton(float(rows.loc[L4L5, "compression_n"]))
+    load = newton(float(rows["compression_n"].to_numpy(float)[LEVELS.index(L4L5)]))
     newtons = float(frame["load_n"])
     hands = f", hands bear {newton(newtons)}" if newtons > LEAST_BORNE_N else ""
-    ended = ENDED.get(str(rows["status"].iloc[0]))
-    doubt = f" Do not use: it ended {ended}." if ended else ""
-    return f"{fixed(time_s)} s: L4–L5 carries {load}{hands}.{doubt}"
+    return f"{fixed(time_s)} s: L4–L5 carries {load}{hands}.{doubt(rows)}"

@@ -5,21 +5,17 @@ from collections.abc import Iterator
 import numpy as np
 import pandas as pd
 
-from spinepipe.effects.contract import Array
 from spinepipe.jobs.digest import provenance
 from spinepipe.jobs.inputs import study_of_kind
 from spinepipe.sensitivity_analysis.global_indices.estimates import Settings
 from spinepipe.sensitivity_analysis.global_indices.indices import indices
 from spinepipe.status import Balanced
 from spinepipe.studies.trunk_loads.rows import Row
-from spinepipe.studies.trunk_loads.sampling import design_of
+from spinepipe.studies.trunk_loads.sampling import censored_quantile, design_of
 from spinepipe.studies.trunk_loads.selection import sound
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.studies.trunk_loads.tables import DRIVERS, INTERVALS, QUANTITIES
 from spinepipe.tables import from_rows, read_frames, write
-
-LEAST_SAMPLES = 20
-"""Below that no interval is given."""
 
 MOST_FAILED = 0.2
 """Share of the samples above which no share is given: what is left would be those that are easy."""
@@ -65,21 +61,6 @@ def _intervals(who: str, task: str, rows: pd.DataFrame, nominal: pd.DataFrame) -
             "n_failed": lost,
             "n_above": above,
         }
-
-
-def censored_quantile(values: Array, beyond: int, p: float) -> float | None:
-    """Quantile of values and of so many of which is known that they are farther from nought.
-
-    None where it lies among those, or where values are fewer than `LEAST_SAMPLES`.
-    """
-    if len(values) < LEAST_SAMPLES:
-        return None
-    away = -1.0 if np.median(values) < 0.0 else 1.0
-    known = np.sort(values)
-    at = p * (len(values) + beyond - 1) - (beyond if away < 0.0 else 0)
-    if not 0.0 <= at <= len(values) - 1:
-        return None
-    return float(np.interp(at, np.arange(len(values)), known))
 
 
 def _drivers(settings: TrunkLoads, who: str, task: str, rows: pd.DataFrame) -> Iterator[Row]:

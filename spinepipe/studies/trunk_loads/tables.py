@@ -23,6 +23,9 @@ LIFT_LOADS = declared(__file__, "lift_loads")
 LIFT_FRAMES = declared(__file__, "lift_frames")
 LIFT_BANDS = declared(__file__, "lift_bands")
 LIFT_PATHS = declared(__file__, "lift_paths")
+PER_LIFT = (LIFT_LOADS, LIFT_FRAMES, LIFT_BANDS, LIFT_PATHS)
+"""Of a person and recorded lift."""
+
 AGAINST_GHEZELBASH_2016 = declared(__file__, "against_ghezelbash_2016")
 
 SIMPLIFICATIONS = SIMPLIFIED.column("simplification").allowed

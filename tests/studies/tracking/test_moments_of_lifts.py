@@ -172,3 +172,15 @@ def test_without_plates_the_height_of_the_box_tells_lift_off(tmp_path: Path) -> 
     by_height = recorded_motion(cohort, "s01", "lift1", lifts.spine())
     by_plate = recorded_motion(lifts.lifts(), "s01", "lift1", lifts.spine())
     assert by_height.lift_off_s == pytest.approx(by_plate.lift_off_s, abs=0.2)
+
+
+def test_what_was_not_measured_tells_nothing(tmp_path: Path) -> None:
+    def edit(folder: Path) -> None:
+        plates = pd.read_csv(folder / "force_plates.csv")
+        plates.assign(fy_n=np.nan).to_csv(folder / "force_plates.csv", index=False)
+        moments = pd.read_csv(folder / "measured_moments.csv")
+        moments.loc[moments["trial"] == "lift1", "mz_nm"] = np.nan
+        moments.to_csv(folder / "measured_moments.csv", index=False)
+
+    _, beside = table_rows(STUDY, edited(tmp_path, edit))
+    assert {row["trial"] for row in beside} == {"lift2", "lift3"}

@@ -53,6 +53,7 @@ def tables(
                         "shear_right_n": 0.0,
                         "required_extension_nm": 0.05 * newtons,
                         "pressure_mpa": 1e-3 * newtons,
+                        "inside_eq_6": newtons < 3700.0,
                         "least_stress_mpa": 0.3,
                         "status": "beyond_strength"
                         if weak
@@ -64,20 +65,22 @@ def tables(
                 )
                 told_of = {"low": 0.9 * newtons, "median": newtons, "high": 1.1 * newtons}
                 if failed > 20:
-                    told_of = dict.fromkeys(told_of)
-                sampled.append(own | told_of | {"n_samples": 100 - failed, "n_failed": failed})
+                    told_of["high"] = None
+                sampled.append(
+                    own | told_of | {"n_samples": 100 - failed, "n_failed": failed, "n_above": 0}
+                )
     made = {"lift_loads": loads, "lift_frames": frames, "lift_bands": sampled if bands else []}
     return {name: pd.DataFrame(of, columns=NAMED[name].names) for name, of in made.items()}
 
 
 CASES: Mapping[str, tuple[Mapping[str, pd.DataFrame], bool]] = {
-    "lift above|lift_limit above|lift_time after|lift_pressure most|lift_held ok|lift_bands ok"
+    "lift above|lift_limit above|lift_time after|lift_pressure beyond|lift_held ok|lift_bands ok"
     "|lift_methods alone_sampled": (tables(), True),
     "lift below|lift_limit below|lift_time before": (tables(3000.0, off=1.2), True),
     "lift open|lift_held stop": (tables(lost=(1.0,)), True),
     "lift none|lift_held stop": (tables(lost=TIMES), True),
     "lift above|lift_range all|lift_bands check": (tables(trials=3, failed=5), True),
-    "lift_bands stop": (tables(failed=40), True),
+    "lift_bands check_open": (tables(failed=40), True),
     "lift_too above|lift_methods sampled": (tables(), False),
     "lift_too below": (tables(3000.0), False),
     "lift_too open": (tables(lost=(1.0,)), False),

@@ -10,6 +10,7 @@ import pytest
 from trunk_person import CLOSELY, made_up
 
 from spinepipe.cohort import Cohort, read
+from spinepipe.documents.yaml_text import YamlDocument
 from spinepipe.motion.recorded_motion import RecordedMotion, net_moments
 from spinepipe.muscles.muscle_equilibrium import SolverOptions
 from spinepipe.muscles.strength import hold_task
@@ -18,6 +19,7 @@ from spinepipe.progress import Progress
 from spinepipe.status import HELD
 from spinepipe.studies.recordings import RECORDED
 from spinepipe.studies.subjects import SUBJECTS
+from spinepipe.studies.trunk_loads.checks import check_lifts, check_trunk
 from spinepipe.studies.trunk_loads.kind import PER_LIFT, TrunkFiles
 from spinepipe.studies.trunk_loads.lifts import (
     LIFTED,
@@ -113,6 +115,13 @@ def test_the_frame_before_changes_no_load() -> None:
             )
 
 
+def test_a_frame_so_near_its_least_stress_that_rounds_swing_is_held_at_a_little_more() -> None:
+    motion = lift_of(cohort(), "s01", "lift3", stands().person)
+    tasks = tasks_of(motion, np.arange(72, 78), 0.6e6)
+    ended = [one.solved.status for one in held_in_turn(stands().person, tasks, SolverOptions())]
+    assert set(ended) <= set(HELD)
+
+
 def test_rows_tell_every_level_of_every_frame_and_what_hands_bear() -> None:
     found, frames = rows(), range(0, len(lift().time_s), 30)
     loads, hands = found["lift_loads"], found["lift_frames"]
@@ -151,18 +160,19 @@ def test_uncertain_lean_turns_bodies_and_no_load() -> None:
     assert leant.pressure_pa == 3e3
 
 
-def test_bands_are_percentiles_of_persons_that_hold() -> None:
+def test_persons_that_do_not_hold_a_frame_count_beyond_its_upper_end() -> None:
     compression = np.zeros((100, 2, len(LEVELS)))
     compression[:, :, 1] = np.arange(100.0)[:, None]
-    held = np.ones((100, 2), dtype=bool)
-    held[90:, 0] = False
-    held[:21, 1] = False  # too many to tell
-    found = pd.DataFrame(band_rows(np.array([0.0, 0.1]), compression, held))
-    first, second = (
-        found[(found["level"] == "L4L5") & (found["time_s"] == t)].iloc[0] for t in (0.0, 0.1)
-    )
-    assert (first["n_samples"], first["n_failed"]) == (90, 10)
-    assert (first["low"], first["high"]) == tuple(np.quantile(np.arange(90.0), [0.025, 0.975]))
+    stress = np.full((100, 2), 0.6e6)
+    stress[90:98, 0] = 1.4e6  # more than trunks have
+    stress[98:, 0] = np.inf
+    stress[5:, 1] = np.inf  # too few to tell
+    found = pd.DataFrame(band_rows(np.array([0.0, 0.1]), compression, stress))
+    own = found[found["level"] == "L4L5"].set_index("time_s")
+    first, second = own.loc[0.0], own.loc[0.1]
+    assert (first["n_samples"], first["n_failed"], first["n_above"]) == (98, 2, 8)
+    assert first["low"] == np.quantile(np.arange(100.0), 0.025)
+    assert first["high"] == pytest.approx(np.quantile(np.arange(100.0), 0.975))
     assert second[["low", "median", "high"]].isna().all()
 
 
@@ -173,3 +183,47 @@ def test_a_study_has_the_lifts_that_a_person_has() -> None:
     assert set(PER_LIFT) <= set(files.tables)
     assert not {"tasks", "levels", "simplified"} & set(files.tables)
     assert files.job_files("lift_loads", "s01", "000")[1].endswith("trial-lift3.parquet")
+
+
+def problems(
+    changed: dict[str, pd.DataFrame | None], trials: tuple[str, ...] = ("lift1",)
+) -> list[str]:
+    """What checks of a study of lifts find in a changed cohort."""
+    tables = {**cohort().further, **changed}
+    further = {name: rows for name, rows in tables.items() if rows is not None}
+    study = STUDY.model_copy(update={"motions": Motions(trials=trials)})
+    document = YamlDocument("lifts.yaml", {"motions": {"trials": list(trials)}}, {})
+    other = replace(cohort(), further=further)
+    return [str(one) for one in check_trunk(document, study, other)]
+
+
+def test_a_cohort_of_lifts_needs_no_tasks_and_what_it_lacks_is_named() -> None:
+    assert problems({}) == []
+    trials = cohort().further["trials"]
+    moving = trials[trials["kind"] != "stance"]
+    (without,) = problems({"trials": moving})
+    assert "no static trial of 's01'" in without
+    assert "mark one static" in without
+    others = trials.iloc[1:]
+    for column, text, told in (
+        ("axes", "x y", "name each axis once"),
+        ("file", "../other.c3d", "leads out of the folder"),
+    ):
+        (wrong,) = problems(
+            {"trials": pd.concat([trials.iloc[:1].assign(**{column: text}), others])}
+        )
+        assert told in wrong
+    (unknown,) = problems({}, ("lift9",))
+    assert "lift9" in unknown
+    (none,) = problems({"trials": None})
+    assert "a cohort without trials.csv" in none
+
+
+def test_recordings_are_looked_at_before_anything_runs() -> None:
+    document = YamlDocument("lifts.yaml", {}, {})
+    assert not list(check_lifts(document, STUDY, cohort(), FOLDER))
+    box = cohort().further["box"]
+    metres = box.assign(**{name: box[name] / 1000.0 for name in ("x_mm", "y_mm")})
+    other = replace(cohort(), further={**cohort().further, "box": metres})
+    found = [str(one) for one in check_lifts(document, STUDY, other, FOLDER)]
+    assert any("not in mm" in one for one in found)

@@ -12,7 +12,15 @@ from spinepipe.muscles.task import Task
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_trunk
 from spinepipe.studies.trunk_loads.forms import HANDS, PUSH_N, PUSH_NM, TASKS
-from spinepipe.studies.trunk_loads.postures import between, read_tasks, rhythm, shares, task_of
+from spinepipe.studies.trunk_loads.postures import (
+    FULL_FLEXION_DEG,
+    between,
+    leaning_deg,
+    read_tasks,
+    rhythm,
+    shares,
+    task_of,
+)
 from spinepipe.studies.trunk_loads.settings import TrunkLoads
 from spinepipe.units import ROTATIONS
 
@@ -224,3 +232,15 @@ def test_units_are_si_inside() -> None:
     )
     assert task.turned[-1, 0] == pytest.approx(-np.pi / 2.0)
     assert (task.pressure_pa, task.stress_pa, task.tone_share) == pytest.approx((1e4, 1e6, 0.05))
+
+
+def test_no_sample_bends_a_back_beyond_full_flexion() -> None:
+    """Upright all that is drawn is added; at the end of flexion the pelvis goes no other way."""
+    assert leaning_deg(8.0, -2.0, 0.0) == pytest.approx(between(8.0, -2.0, "extension"))
+    assert leaning_deg(8.0, -2.0, FULL_FLEXION_DEG) == pytest.approx(np.full(8, -2.0))
+    assert leaning_deg(8.0, -2.0, FULL_FLEXION_DEG - 4.0) == pytest.approx(
+        between(2.0, -2.0, "extension")
+    )
+    # who bends less than full flexion may; one who was seen beyond it bends no farther
+    assert leaning_deg(-8.0, 2.0, FULL_FLEXION_DEG)[0] == pytest.approx(-8.0)
+    assert leaning_deg(1.0, 0.0, FULL_FLEXION_DEG + 5.0) == pytest.approx(np.zeros(8))
