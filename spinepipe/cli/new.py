@@ -127,7 +127,12 @@ def _chosen(read: Cohort, name: str, yes: bool) -> str:
     # what can be asked before there are data comes first, all others by name
     ordered = sorted(every_kind(), key=lambda one: (kind_of(one).before_data is None, one))
     offered, lacks, problems = list[str](), list[str](), list[InputProblem]()
+    # every kind's files were read; where vertebrae are, only some of them tell
+    placed = read.joints is not None or read.landmarks is not None
     for kind in ordered:
+        if not placed and not any(form.places for form in kind_of(kind).forms):
+            lacks.append(f"  {kind}: needs landmarks.csv or joints.csv")
+            continue
         data = {"study": name, "kind": kind, "cohort": read.name}
         try:
             studies.of_data(data | (yaml.safe_load(kind_of(kind).starter) or {}), read, name)

@@ -171,7 +171,7 @@ def _guarded(name: str, function: Callable[..., int | None]) -> Callable[..., No
             if asked["quiet"] and code and not asked["json"]:  # what is wrong, and no more
                 lines = said.getvalue().splitlines()
                 print("\n".join(one for one in lines if one[:4] not in ("ok  ", "warn")))
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, typer.Abort):  # Ctrl-C, and a question that nobody answers
             code = STOPPED
         except BrokenPipeError:  # the reader of a pipe, such as `head`, has seen enough
             # what is still to be printed goes nowhere, or Python would complain at its end

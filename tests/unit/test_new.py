@@ -49,6 +49,25 @@ def test_what_the_data_can_answer_is_offered_and_the_chosen_one_is_sound(
     assert check(root, "other", starting=False)[0].kind == "discrepancy"
 
 
+def test_recordings_alone_are_offered_what_reads_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without joints, markers' places and tasks: nothing that needs joints is offered."""
+    (tmp_path / "config/cohorts").mkdir(parents=True)
+    (tmp_path / "config/studies").mkdir()
+    shipped = Path(__file__).resolve().parents[2] / "config/cohorts/stoop_lift"
+    (tmp_path / "config/cohorts/lifts").symlink_to(shipped)
+    for number in (1, 2):
+        monkeypatch.setattr("sys.stdin", io.StringIO(f"{number}\n"))
+        assert new(tmp_path, "study", f"my{number}", "--cohort", "lifts") == 0
+    assert "range_of_motion: needs landmarks.csv or joints.csv" in capsys.readouterr().out
+    markers, loads = (check(tmp_path, f"my{n}", starting=False)[0] for n in (1, 2))
+    assert (markers.kind, markers.marker_set) == ("tracking", "plug_in_gait")
+    assert (loads.kind, loads.motions.trials) == ("trunk_loads", ("lift1", "lift2", "lift3"))
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))  # nobody answers
+    assert new(tmp_path, "study", "my3", "--cohort", "lifts") == 130
+
+
 @sweep("kind", kind_names())
 def test_the_first_line_leads_to_the_schema_of_its_keys(root: Path, kind: str) -> None:
     assert new(root, "study", f"my_{kind}", "--cohort", "straight", "--kind", kind) == 0

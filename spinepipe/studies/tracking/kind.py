@@ -9,7 +9,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
-from spinepipe.studies.recordings import motion_digests
+from spinepipe.studies.recordings import TRIALS, motion_digests
 from spinepipe.studies.study import Study
 from spinepipe.studies.study_files import Figure, StudyFiles, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
@@ -209,6 +209,15 @@ class TrackingFiles(StudyFiles):
             yield ""
 
 
+def settle_markers(study: Tracking, cohort: Cohort) -> Tracking:
+    """A study that leaves it to the cohort which markers it has."""
+    told = "marker_set" in study.model_fields_set
+    own = {*cohort.further, *(["joints"] if cohort.joints is not None else [])}
+    if told or own & {"marker_set", "joints"} or TRIALS.stem not in own:
+        return study
+    return study.model_copy(update={"marker_set": "plug_in_gait"})
+
+
 def _digests_of_motion(expected: Any, place: Mapping[str, str]) -> list[str]:
     """Of the recorded motion of a person, as declared jobs are asked for it."""
     return motion_digests(expected.cohort, place["specimen"])
@@ -281,6 +290,7 @@ KIND = Kind(
     ),
     exports="opensim:exported",
     forms=(SUBJECTS, *FORMS),
+    settled=settle_markers,
     told_by_check="examine:told",
     doubts="plausibility:doubts",
 )

@@ -193,7 +193,8 @@ class Tracking(Study):
         default="own",
         description="own: marker_set.csv of the cohort, by the approaches below; plug_in_gait: "
         "pelvis, thorax, head and arms as Plug-in-Gait marks them, and net moments of all joints "
-        "of a spine made of sex, height and mass; of what follows `cutoff_hz` and `ratios` count",
+        "of a spine made of sex, height and mass; of what follows `cutoff_hz` and `ratios` count. "
+        "Left out: plug_in_gait where the cohort has neither markers nor joints of its own",
     )
     cutoff_hz: float = Field(
         default=6.0,

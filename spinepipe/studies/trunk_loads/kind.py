@@ -8,7 +8,7 @@ from spinepipe.cohort import Cohort
 from spinepipe.comparison.papers import beside, hangs_on
 from spinepipe.schema import all_declared
 from spinepipe.studies.kind import Job, Kind, ignoring
-from spinepipe.studies.recordings import RECORDED, motion_digests
+from spinepipe.studies.recordings import MOVING, RECORDED, TRIALS, motion_digests
 from spinepipe.studies.study_files import Figure, StudyFiles, files_of_block, numbered_blocks
 from spinepipe.studies.subjects import SUBJECTS
 from spinepipe.studies.trunk_loads.checks import check_lifts, check_source, check_trunk
@@ -183,6 +183,17 @@ def _source_and_motion(expected: Any, place: Mapping[str, str]) -> list[str]:
     return [*_source(expected, place), *motion_digests(expected.cohort, place["specimen"])]
 
 
+def settle_lifts(study: TrunkLoads, cohort: Cohort) -> TrunkLoads:
+    """A study that leaves it to the cohort which lifts it has: without tasks all that move."""
+    further, told = cohort.further, "trials" in study.motions.model_fields_set
+    if told or TASKS.stem in further or TRIALS.stem not in further:
+        return study
+    rows = further[TRIALS.stem]
+    moving = tuple(dict.fromkeys(rows["trial"][rows["kind"].isin(MOVING)].astype(str)))
+    motions = study.motions.model_copy(update={"trials": moving})
+    return study.model_copy(update={"motions": motions})
+
+
 _NO_TASK_OF_ITS_OWN = ignoring("uncertain", "volunteer", "simplified_tasks", "motions")
 
 KIND = Kind(
@@ -226,6 +237,7 @@ KIND = Kind(
         _AGAINST,
     ),
     forms=(SUBJECTS, TASKS, *RECORDED, *GEOMETRY_FORMS),
+    settled=settle_lifts,
     doubts="checks:doubts",
     why_no_export="a task is solved for muscle forces in a given posture, and muscles are not "
     "written: the source package of the trunk is the model to take elsewhere",

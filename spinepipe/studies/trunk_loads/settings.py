@@ -215,7 +215,9 @@ class Motions(BaseModel):
     model_config = FORM
 
     trials: EachOnce[str] = Field(
-        default=(), description="recorded trials whose frames are tasks, of everyone who has them"
+        default=(),
+        description="recorded trials whose frames are tasks, of everyone who has them; left out: "
+        "all that move where the cohort has no tasks.csv",
     )
     every: int = Field(default=1, ge=1, le=1000, description="take every so manieth frame")
     largest_stress_mpa: float = Field(
@@ -226,7 +228,7 @@ class Motions(BaseModel):
         "that does, as far as trunks have it",
     )
     samples: int = Field(
-        default=0,
+        default=40,
         ge=0,
         le=10_000,
         description="persons drawn for bands, by the factors of uncertain; 0: no bands. Hands are "
