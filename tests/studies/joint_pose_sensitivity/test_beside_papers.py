@@ -94,14 +94,15 @@ def test_joint_pose_figures_of_a_cohort_of_the_other_paper(name: str, tmp_path: 
 
 
 def test_tables_of_job_files_of_every_kind_are_joined() -> None:
-    own = {"tracking": "tracking_phantom"}  # by kinds that ask the cohort for files of their own
+    # by kinds that ask the cohort for files of their own
+    own = {"tracking": "tracking_phantom", "trunk_loads": "trunk_volunteers"}
     asked = {
         "cohort_stiffness": {"nuisances"},
         "joint_pose_sensitivity": {
             *("method_fits", "posterior", "posterior_motion", "pose_weights"),
             "stiffness_over_load_point",
         },
-        "trunk_loads": {"responses"},
+        "trunk_loads": {"responses", "lift_loads", "lift_frames", "lift_bands", "lift_paths"},
     }  # by studies that ask for them
     for name in kind_names():
         cohort = own.get(name, "t12s1_phantom")
