@@ -114,7 +114,7 @@ class SceneStep:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class Timeline:
     """A number over the time of a motion, drawn below its slider.
 
     Attributes
@@ -149,7 +149,7 @@ class Scene:
     camera: Camera = Camera()
     pause_ms: int = 700
     one_scale: bool = True
-    course: Course | None = None
+    course: Timeline | None = None
 
 
 def rotation_vector(rotation: Array) -> Array:
@@ -214,7 +214,7 @@ def scenes_as_data(scenes: Sequence[Scene]) -> dict[str, Any]:
     return {"sides": SIDES, "shapes": list(shapes), "meshes": kept, "scenes": told}
 
 
-def _course(course: Course) -> dict[str, Any]:
+def _course(course: Timeline) -> dict[str, Any]:
     """In percent of the time and of the largest value; down is positive, as in SVG."""
     start, end = float(course.time_s[0]), float(course.time_s[-1])
     share = 100.0 / max(end - start, 1e-9)

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.muscles.trunk import BODIES, LEVELS
-from spinepipe.report.viewer.scene import Course, Scene, SceneStep
+from spinepipe.report.viewer.scene import Timeline, Scene, SceneStep
 from spinepipe.report.words import capital, fixed, plain
 from spinepipe.studies.trunk_loads.lift_rows import L4L5, lifts_of, of_lift
 from spinepipe.studies.trunk_loads.samples import Tables
@@ -82,7 +82,7 @@ def _scene(
             )
         )
     course_of = loads[loads["level"] == L4L5].sort_values("time_s")
-    course = Course(
+    course = Timeline(
         course_of["time_s"].to_numpy(float),
         course_of["compression_n"].to_numpy(float),
         paths["time_s"].unique().astype(float),
