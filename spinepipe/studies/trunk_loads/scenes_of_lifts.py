@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from spinepipe.muscles.trunk import BODIES, LEVELS
-from spinepipe.report.viewer.scene import Timeline, Scene, SceneStep
+from spinepipe.report.viewer.scene import Scene, SceneStep, Timeline
 from spinepipe.report.words import capital, fixed, plain
 from spinepipe.studies.trunk_loads.lift_rows import L4L5, lifts_of, of_lift
 from spinepipe.studies.trunk_loads.samples import Tables
