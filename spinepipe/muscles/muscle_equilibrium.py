@@ -18,7 +18,7 @@ from spinepipe.muscles.paths import Pulls
 from spinepipe.muscles.person import Person, above
 from spinepipe.muscles.pose import BodyPoses, place_bodies, rotations_of
 from spinepipe.muscles.task import Task
-from spinepipe.muscles.trunk import LEVELS
+from spinepipe.muscles.trunk import EXTENSION, LEVELS
 from spinepipe.status import Balanced
 
 L4L5 = LEVELS.index("L4L5")
@@ -32,8 +32,8 @@ _HEAVY_N = 3000.0
 _LOWEST = 3
 """Rows of L5S1 in a demand."""
 
-_ALONG, _EXTENSION = 1, 2
-"""Axes of a disc."""
+_ALONG = 1
+"""Axis of a disc along the spine."""
 
 
 @dataclass(frozen=True)
@@ -284,7 +284,7 @@ def _solve_round(
     loads = applied_loads(person, task, poses)
     stiffening = person.laws.stiffening(-pushes[:, 1])
     joint = stiffening[:, None] * turned.unpressed
-    joint[:, _EXTENSION] += turned.ligaments
+    joint[:, EXTENSION] += turned.ligaments
     # what loads and joints leave to the muscles, and what these can make
     weights, turning = above(loads.forces, loads.moments, poses.centres)
     required = -(turning + np.einsum("kij,kj->ki", poses.discs, joint))

@@ -24,7 +24,7 @@ from scipy.interpolate import PchipInterpolator
 from spinepipe.anatomy import published
 from spinepipe.effects.contract import Array
 from spinepipe.facts import number, numbers, several
-from spinepipe.muscles.trunk import LEVELS
+from spinepipe.muscles.trunk import EXTENSION, LEVELS
 from spinepipe.units import DEG_PER_RAD
 
 AXIAL_N_PER_M = numbers(__name__, "axial_stiffness")
@@ -42,7 +42,6 @@ LUMBAR_FLEXION_DEG = number(__name__, "lumbar_full_flexion")
 """Full flexion of L5S1 to T12L1 together, from upright."""
 
 _STEEPNESS = number(__name__, "ligament_steepness")
-_EXTENSION = 2
 
 
 @dataclass(frozen=True)
@@ -211,14 +210,14 @@ class JointLaws:
         """(..., 7) N m of ligaments on what is above, extension positive."""
         if self.ligaments is None:
             return np.zeros(turned.shape[:-1])
-        return self.ligaments.moments(self.upright - turned[..., _EXTENSION])
+        return self.ligaments.moments(self.upright - turned[..., EXTENSION])
 
     def slopes(self, turned: Array, compression: Array) -> Array:
         """(7, 3) N m/rad, how fast the resistance grows with the rotations."""
         slope = self._each("slope", turned)
         found: Array = self.stiffening(compression)[:, None] * self.angular * slope
         if self.ligaments is not None:
-            found[:, _EXTENSION] += self.ligaments.slopes(self.upright - turned[:, _EXTENSION])
+            found[:, EXTENSION] += self.ligaments.slopes(self.upright - turned[:, EXTENSION])
         return found
 
     def _each(self, what: Literal["moment", "slope"], turned: Array) -> Array:

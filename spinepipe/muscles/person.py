@@ -12,10 +12,8 @@ from spinepipe.muscles.passive_tissue import JointLaws, PassiveMuscle
 from spinepipe.muscles.paths import Lines
 from spinepipe.muscles.pose import JointCentres, place_bodies, rotations_of
 from spinepipe.muscles.subject import Subject
-from spinepipe.muscles.trunk import LEVELS, Mass
+from spinepipe.muscles.trunk import EXTENSION, LEVELS, Mass
 from spinepipe.units import STANDARD_GRAVITY
-
-_EXTENSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +59,7 @@ class Person:
         # the source's fibres, and where it has none a share of the path
         own = self.lines.trunk.muscles.fibre
         fibres = np.where(own > 0.0, own, self.passive.fibre_share * rest)
-        laws = replace(self.laws, upright=poses.turned[:, _EXTENSION])
+        laws = replace(self.laws, upright=poses.turned[:, EXTENSION])
         return replace(self, laws=laws, upright=upright, rest=rest, fibres=fibres)
 
 

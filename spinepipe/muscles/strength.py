@@ -18,7 +18,7 @@ from spinepipe.muscles.forces import Demand, least_slack_forces
 from spinepipe.muscles.muscle_equilibrium import SolvedTask, SolverOptions, solve_task
 from spinepipe.muscles.person import Person, above
 from spinepipe.muscles.task import Task
-from spinepipe.muscles.trunk import LEVELS
+from spinepipe.muscles.trunk import EXTENSION, LEVELS
 from spinepipe.status import Balanced
 
 _PEOPLE = several(__name__, "trunk_muscle_stress")
@@ -26,7 +26,6 @@ LOWEST_PA, HIGHEST_PA = _PEOPLE["range"]
 (MEAN_PA,) = _PEOPLE["mean"]
 """Largest active stress of trunk extensors, over persons."""
 
-_EXTENSION = 2
 
 _ABOVE_LEAST, _STEP, _NEAR = 1.01, 1.01, 1.03
 """Stress that is tried next over the least one of this posture; at least so much over one that did
@@ -222,7 +221,7 @@ def capacity_left(solved: SolvedTask) -> Array | None:
     found, made = np.zeros(len(LEVELS)), solved.demand.required - solved.found.slack
     for level, disc in enumerate(solved.poses.discs):
         direction = np.zeros(made.shape)
-        direction[3 * level : 3 * level + 3] = disc[:, _EXTENSION]
+        direction[3 * level : 3 * level + 3] = disc[:, EXTENSION]
         found[level] = most_along(solved.demand, direction, made) or 0.0
     return found
 

@@ -43,6 +43,9 @@ that they pass, see `Muscles.wraps`."""
 
 SIDES = ("right", "left")
 
+EXTENSION = 2
+"""Axis of bodies and discs that extension is about: the one to the right."""
+
 
 def body_of(vertebra: str) -> int:
     """Body that a vertebra belongs to: T1 to T10 move with T11."""

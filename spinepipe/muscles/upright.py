@@ -15,7 +15,7 @@ from scipy.optimize import linprog
 from spinepipe.effects.contract import Array
 from spinepipe.muscles.masses import arm_masses
 from spinepipe.muscles.person import Person
-from spinepipe.muscles.trunk import BODIES, LEVELS, SIDES
+from spinepipe.muscles.trunk import BODIES, EXTENSION, LEVELS, SIDES
 from spinepipe.units import STANDARD_GRAVITY
 
 MOST_ROUNDS = 30
@@ -30,7 +30,6 @@ _SMALL_NM = 1e-6
 
 _SAME_NM = 1e-3
 """Sums that differ by less are the same: then the earlier beginning counts."""
-_EXTENSION = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +98,8 @@ def moment_deficit(person: Person, angles: Array) -> Array:
     above = bodies > np.arange(len(LEVELS))[:, None]
     turning = carried * centres[..., 0] - (weights * forwards) @ above.T
     bent = np.zeros_like(pushes)
-    bent[..., _EXTENSION] = np.diff(angles, axis=-1)
-    total = turning + person.laws.moments(bent, -pushes[..., 1])[..., _EXTENSION]
+    bent[..., EXTENSION] = np.diff(angles, axis=-1)
+    total = turning + person.laws.moments(bent, -pushes[..., 1])[..., EXTENSION]
     # of each vertebra alone: less what all above the joint above it lacks
     own = total.copy()
     own[..., :-1] -= total[..., 1:]

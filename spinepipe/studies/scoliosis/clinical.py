@@ -46,11 +46,7 @@ def clinical_rows(cohort: Cohort) -> Iterator[dict[str, Any]]:
                 )
                 cobb, before = curve.cobb(film), curve.cobb(erect)
                 taken_off = 100.0 * (1.0 - cobb / before)
-                seen = read.compared(position)
-                ends, points = (
-                    seen[[*at]].all()
-                    for at in ((curve.lower, curve.upper), (curve.lower, curve.apex, curve.upper))
-                )
+                ends, points = curve.read(read.compared(position))
                 yield {
                     "specimen": patient,
                     "position": position,

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from spinepipe.effects.contract import Array
-from spinepipe.studies.scoliosis.films import Film
+from spinepipe.studies.scoliosis.films import Film, Flags
 
 LEAST_CURVE = float(np.deg2rad(5.0)) + 1e-9
 """Changes of tilt up to 5 deg are waves of the line, no curves; rounding makes no curve of one that
@@ -46,6 +46,11 @@ class SpinalCurve:
         above = points[self.upper] - points[self.apex]
         tilt_below, tilt_above = (np.arctan2(*line) for line in (below, above))
         return float(self.side * (tilt_below - tilt_above))
+
+    def read(self, seen: Flags) -> tuple[bool, bool]:
+        """Whether both ends, and whether they and the apex, are among the vertebrae (V,) seen."""
+        ends = bool(seen[self.lower] and seen[self.upper])
+        return ends, ends and bool(seen[self.apex])
 
     def ferguson_by(self, film: Film) -> Array:
         """(2, V) rad/m: change of Ferguson's angle with right and up of every vertebra."""

@@ -234,10 +234,7 @@ def _curves(patient: Patient, position: str, posed: SpinePose) -> Iterator[Row]:
     film, there = patient.read.films[position], posed.result.status in POSED
     read, vertebrae = patient.read.compared(position), patient.read.vertebrae
     for number, curve in enumerate(patient.curves):
-        ends, points = (
-            read[[curve.lower, curve.upper]],
-            read[[curve.lower, curve.apex, curve.upper]],
-        )
+        ends, points = curve.read(read)
         simulated = {
             "cobb_simulated_deg": DEG_PER_RAD * curve.cobb(posed.film) if there else None,
             "ferguson_simulated_deg": DEG_PER_RAD * curve.ferguson(posed.film) if there else None,
@@ -249,7 +246,7 @@ def _curves(patient: Patient, position: str, posed: SpinePose) -> Iterator[Row]:
             "lower_vertebra": vertebrae[curve.lower],
             "apex_vertebra": vertebrae[curve.apex],
             "upper_vertebra": vertebrae[curve.upper],
-            "cobb_measured_deg": DEG_PER_RAD * curve.cobb(film) if ends.all() else None,
-            "ferguson_measured_deg": DEG_PER_RAD * curve.ferguson(film) if points.all() else None,
+            "cobb_measured_deg": DEG_PER_RAD * curve.cobb(film) if ends else None,
+            "ferguson_measured_deg": DEG_PER_RAD * curve.ferguson(film) if points else None,
             **simulated,
         }

@@ -14,6 +14,7 @@ from spinepipe.motion.recorded_motion import RecordedMotion, net_moments
 from spinepipe.motion.skeleton import JOINTS
 from spinepipe.motion.standing_spine import usual_spine
 from spinepipe.muscles.myo_sim import source_of_myo_sim
+from spinepipe.muscles.trunk import Trunk
 from spinepipe.studies.recorded_motion import recorded_motion
 from spinepipe.studies.recordings import MEASURED_MOMENTS, STANCE, of_trial, trial_rows
 from spinepipe.studies.subjects import subject_of
@@ -28,7 +29,7 @@ MOMENTS = ("right_bending_nm", "left_rotation_nm", "extension_nm")
 
 FORCES = ("anterior_n", "superior_n", "right_n")
 MEASURED = ("mx_nm", "my_nm", "mz_nm")
-EXTENSION = 2
+EXTENSION = MOMENTS.index("extension_nm")
 
 ABOUT_LIFT_OFF_S = 0.15
 """To each side of lift-off, where a plate and filtered markers do not tell the same instant."""
@@ -52,8 +53,9 @@ def run(
 def table_rows(settings: Tracking, cohort: Cohort) -> tuple[Rows, Rows]:
     """Rows of `joint_moments`, and of `moment_agreement`."""
     rows, agreement = Rows(), Rows()
+    source = source_of_myo_sim().trunk
     for specimen in cohort.specimen_names:
-        for motion in motions_of(settings, cohort, specimen):
+        for motion in motions_of(settings, cohort, specimen, source):
             known = {"specimen": specimen, "trial": motion.name}
             both = zip(WAYS, (motion.loads, motion.still), strict=True)
             found = {way: net_moments(motion.joints, loads) for way, loads in both}
@@ -67,9 +69,11 @@ Found = Mapping[str, tuple[Array, Array]]
 """Forces (F, 17, 3) N and moments (F, 17, 3) N m with accelerations and without, by `WAYS`."""
 
 
-def motions_of(settings: Tracking, cohort: Cohort, specimen: str) -> Iterator[RecordedMotion]:
-    """The trials of a person that move."""
-    spine = usual_spine(subject_of(cohort, specimen), source_of_myo_sim().trunk)
+def motions_of(
+    settings: Tracking, cohort: Cohort, specimen: str, source: Trunk
+) -> Iterator[RecordedMotion]:
+    """The trials of a person that move; the person's spine is made of a reference trunk."""
+    spine = usual_spine(subject_of(cohort, specimen), source)
     shares = ratios_of(cohort)[settings.ratios]
     for row in trial_rows(cohort, specimen):
         if row["kind"] != STANCE:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, Field, WithJsonSchema
 
 from spinepipe.motion.joint_tables import USUAL_SHARES
+from spinepipe.motion.smoothing import USUAL_CUTOFF_HZ
 from spinepipe.problems import did_you_mean, one_of
 from spinepipe.studies.parts import FORM, EachOnce
 from spinepipe.studies.study import Study
@@ -197,7 +198,7 @@ class Tracking(Study):
         "Left out: plug_in_gait where the cohort has neither markers nor joints of its own",
     )
     cutoff_hz: float = Field(
-        default=6.0,
+        default=USUAL_CUTOFF_HZ,
         gt=0,
         le=50,
         description="of the zero-phase low-pass filter that Plug-in-Gait markers go through",
