@@ -56,6 +56,9 @@ def test_sentences_follow_the_numbers() -> None:
     }
     assert {("moment", "agrees"), ("compared", "ok"), ("other", "told")} <= found["made"]
     assert {("moment", "differs"), ("compared", "check")} <= found["far"]
+    # peaks that accelerations do not raise are not called lower
+    assert ("quasi_static", "less") in found["made"]
+    assert ("quasi_static", "off") in found["far"]
     assert {("moment", "alone"), ("compared", "check_alone")} <= found["alone"]
     assert found["nothing"] == {("moment", "none")}
     told_of = {"course", "peak", "before", "quasi_static", "lifted"}
