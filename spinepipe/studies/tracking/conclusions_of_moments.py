@@ -45,8 +45,13 @@ def conclusions_of_moments(study: Tracking, tables: Tables) -> Iterator[Conclusi
         yield Conclusion("compared", "check_alone")
     else:
         beside = agreement[(agreement["joint"] == joint) & (agreement["method"] == method)]
-        yield from _compared(beside, values, names | {"method": plain(method)})
-        yield from _others(agreement, joint, method)
+        names |= {"method": plain(method)}
+        if beside["peak_percent"].isna().any():  # a measured moment that never extends
+            yield Conclusion("moment", "opposite", values, names)
+            yield Conclusion("compared", "check_opposite", names=names)
+        else:
+            yield from _compared(beside, values, names)
+            yield from _others(agreement, joint, method)
     used = {"cutoff": Value(study.cutoff_hz, "Hz", source="settings: cutoff_hz")}
     yield Conclusion("lifted", "told", used, {"ratios": plain(study.ratios)})
 

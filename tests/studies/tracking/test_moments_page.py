@@ -1,5 +1,6 @@
 """The page of recorded lifts: every verdict from moments that make it, a figure that fits."""
 
+from dataclasses import replace
 from functools import cache
 
 import lifts
@@ -32,6 +33,15 @@ def far() -> StudyTables:
     return StudyTables(made() | {"moment_agreement": beside})
 
 
+def opposite() -> StudyTables:
+    """As if measured moments had the other sign."""
+    cohort = lifts.lifts()
+    rows = cohort.further["measured_moments"]
+    turned = cohort.further | {"measured_moments": rows.assign(mz_nm=-rows["mz_nm"])}
+    beside = frame(MOMENT_AGREEMENT, table_rows(STUDY, replace(cohort, further=turned))[1])
+    return StudyTables(made() | {"moment_agreement": beside})
+
+
 def alone() -> StudyTables:
     return StudyTables(made() | {"moment_agreement": made()["moment_agreement"][:0]})
 
@@ -50,6 +60,7 @@ def test_sentences_follow_the_numbers() -> None:
         for name, tables in (
             ("made", made()),
             ("far", far()),
+            ("opposite", opposite()),
             ("alone", alone()),
             ("nothing", nothing()),
         )
@@ -59,6 +70,7 @@ def test_sentences_follow_the_numbers() -> None:
     # peaks that accelerations do not raise are not called lower
     assert ("quasi_static", "less") in found["made"]
     assert ("quasi_static", "off") in found["far"]
+    assert {("moment", "opposite"), ("compared", "check_opposite")} <= found["opposite"]
     assert {("moment", "alone"), ("compared", "check_alone")} <= found["alone"]
     assert found["nothing"] == {("moment", "none")}
     told_of = {"course", "peak", "before", "quasi_static", "lifted"}
@@ -66,7 +78,7 @@ def test_sentences_follow_the_numbers() -> None:
 
 
 def test_pages_and_figures_are_sound() -> None:
-    for tables in (made(), far(), alone(), nothing()):
+    for tables in (made(), far(), opposite(), alone(), nothing()):
         assert list(faults_of_told(said(tables))) == []
         assert list(faults_of_chart(moments(STUDY, lifts.lifts(), tables))) == []
         results = ResultTables(tables)
